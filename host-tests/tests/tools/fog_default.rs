@@ -4,7 +4,7 @@
 use gyronet_host_tests::sequence::{path_error, simulate};
 use gyronet_paper::fog_replay::run_board;
 use gyronet_paper::simulate::fog::{self, Fog};
-use gyronet_paper::simulate::vehicles::KAIST;
+use gyronet_paper::simulate::vehicles::FOG;
 use gyronet_paper::simulate::world::EARTH_RATE;
 use gyronet_paper::simulate::{Set, Spec};
 
@@ -58,7 +58,7 @@ impl Errors {
     fn add(&mut self, spec: &Spec) {
         let sequence = simulate(spec);
         let sent = run_board(&sequence);
-        let quiet = fog::Config { angle_walk: 0.0, ..KAIST.fog };
+        let quiet = fog::Config { angle_walk: 0.0, ..FOG };
         let [.., bias] = Fog::of_device(&quiet, spec.device, spec.run).increment([0.0; 3], 1.0);
         let earth = EARTH_RATE * sequence.latitude_deg().to_radians().sin();
         let less =

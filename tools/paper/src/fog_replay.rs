@@ -65,22 +65,13 @@ fn default_config(sequence: &Sequence) -> FogConfig {
     FogConfig { errors: FogErrors::DSP1760, latitude, ..FogConfig::DEFAULT }
 }
 
-/// The weights are for another gyro than the sequence's.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("trained for a {trained}, the sequence has a {part} number {serial}")]
-pub struct GyroMismatch {
-    trained: Training,
-    part: Gyro,
-    pub serial: u32,
-}
-
 /// Checks that weights are for the gyro of a sequence. A simulated gyro has its device number as serial number; a
-/// recorded gyro is assumed to have the serial number that the weights name.
-pub fn check_weights(sequence: &Sequence, trained: Training) -> Result<(), GyroMismatch> {
+/// recorded gyro is assumed to have the serial number that the weights name. The error names both.
+pub fn check_weights(sequence: &Sequence, trained: Training) -> Result<(), String> {
     let part = Gyro::Dsp1760;
     let serial = sequence.simulated.as_ref().map_or(trained.serial, |spec| spec.device as u32);
     if trained.gyro != part || trained.serial != 0 && trained.serial != serial {
-        return Err(GyroMismatch { trained, part, serial });
+        return Err(format!("trained for a {trained}, the sequence has a {part} number {serial}"));
     }
     Ok(())
 }

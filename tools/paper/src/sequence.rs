@@ -18,7 +18,10 @@ pub(super) use kaist::yaw;
 pub(super) use rows::columns;
 pub use summary::{Seen, StreamSummary};
 
-use crate::simulate::{MARKER, Spec, vehicles::KAIST};
+use crate::simulate::{
+    MARKER, Spec,
+    vehicles::{CAR, LATITUDE_DEG},
+};
 use gyronet::bias::STATIC_SAMPLES;
 use gyronet::sample::{ImuSample, PERIOD_US, Validity};
 use gyronet::units::{AngularRate, Micros, SpecificForce};
@@ -73,8 +76,8 @@ pub struct Sequence {
     pub has_gyro: bool,
     /// Says whether [`Step::vendor_yaw`] comes from a vendor's filter.
     pub has_vendor: bool,
-    /// Distance between the left and the right wheel, m, if the data contain it.
-    pub wheel_base: Option<f64>,
+    /// Distance between the left and the right wheel, m.
+    pub wheel_base: f64,
     /// Latitude of the first pose, deg, if poses are in UTM.
     pub latitude: Option<f64>,
     /// The time of the first step, s since 1970.
@@ -97,8 +100,7 @@ struct Files {
     wheels: Track<2>,
     truth: Track<3>,
     has_gyro: bool,
-    has_vendor: bool,
-    wheel_base: Option<f64>,
+    wheel_base: f64,
 }
 
 fn is_sequence(folder: &Path) -> bool {
@@ -131,7 +133,7 @@ impl Sequence {
         let simulated = marker(folder)?;
         let mut files = kaist::open(folder)?;
         // The heading beside the sensor's data in a simulated sequence does not come from a vendor's filter.
-        let has_vendor = files.has_vendor && simulated.is_none();
+        let has_vendor = simulated.is_none();
         let begin = files.begin()?;
         let mut steps = Vec::new();
         let mut in_gap = [0; 4];
@@ -183,9 +185,8 @@ impl Sequence {
     /// Returns the latitude for the Earth's rate: that of the simulation, or of the place where the data set was
     /// recorded.
     pub fn latitude_deg(&self) -> f64 {
-        let made = KAIST.world.latitude_deg;
         // A simulated world rotates as at the latitude of its settings, whatever the position of its map.
-        self.latitude.filter(|_| self.simulated.is_none()).unwrap_or(made)
+        self.latitude.filter(|_| self.simulated.is_none()).unwrap_or(LATITUDE_DEG)
     }
 
     /// Returns the true change of heading in each step, rad; zero in the first.
@@ -198,8 +199,7 @@ impl Sequence {
     /// Returns the rates of the left and the right wheel in a step, rad/s, by the wheel radius of the data set's
     /// vehicle.
     pub fn wheel_rates(&self, step: &Step) -> [f64; 2] {
-        let radius = KAIST.world.car.wheel_radius;
-        step.wheels.map(|way| way / DT / radius)
+        step.wheels.map(|way| way / DT / CAR.wheel_radius)
     }
 
     /// Converts the drive to a recording, as the other commands use it. Steps in a gap of the inertial sensor are left

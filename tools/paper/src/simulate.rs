@@ -11,7 +11,6 @@ mod delay;
 pub mod fog;
 mod kaist;
 mod odometer;
-mod text;
 mod town;
 pub mod vehicles;
 pub mod world;
@@ -82,14 +81,13 @@ struct Drive {
 
 impl Drive {
     fn new(spec: &Spec) -> Self {
-        let vehicle = &vehicles::KAIST;
         let way = Town::new(spec.run);
         let heading = Purpose::Stamps.stream(spec.run).between(0.0, std::f64::consts::TAU);
         Self {
-            world: World::new(&vehicle.world, way, heading, spec.run),
-            mems: Mems::of_device(&vehicle.mems, spec.device, spec.run),
-            fog: Fog::of_device(&vehicle.fog, spec.device, spec.run),
-            odometer: Odometer::new(&vehicle.wheels, spec.run),
+            world: World::new(way, heading, spec.run),
+            mems: Mems::of_device(&vehicles::MEMS, spec.device, spec.run),
+            fog: Fog::of_device(&vehicles::FOG, spec.device, spec.run),
+            odometer: Odometer::new(spec.run),
             magnetometer: Purpose::Magnetometer.stream(spec.run),
             ticks: (spec.seconds * RATE_HZ) as usize,
         }

@@ -3,7 +3,7 @@
 use super::{named, print_json, remark};
 use gyronet_paper::fog_replay;
 use gyronet_paper::sequence::{self, Sequence};
-use gyronet_paper::simulate::vehicles::KAIST;
+use gyronet_paper::simulate::vehicles::CAR;
 use gyronet_tools::drive::vehicle::Vehicle;
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -76,9 +76,8 @@ fn write(args: &Args, sequence: &Sequence) -> super::Result {
             sequence::write_csv(sequence, out)
         };
         let rows = rows.map_err(named(path))?;
-        let radius = KAIST.world.car.wheel_radius;
         let beside = Vehicle::beside(path);
-        super::write(&beside, format!("[wheels]\nradius_m = {radius:?}\n"))?;
+        super::write(&beside, format!("[wheels]\nradius_m = {:?}\n", CAR.wheel_radius))?;
         remark(format_args!("{}: {rows} rows; {} beside it", path.display(), beside.display()))?;
     }
     Ok(())

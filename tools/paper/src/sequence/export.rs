@@ -20,32 +20,22 @@ pub fn write_whole(sequence: &Sequence, out: impl Write) -> io::Result<u64> {
     write(sequence, out, |step| !step.imu_gap && !step.other_gap)
 }
 
-fn write(sequence: &Sequence, mut out: impl Write, kept: impl Fn(&Step) -> bool) -> io::Result<u64> {
-    writeln!(out, "{HEADER}")?;
+fn write(sequence: &Sequence, out: impl Write, kept: impl Fn(&Step) -> bool) -> io::Result<u64> {
+    let mut out = csv::WriterBuilder::new().has_headers(false).from_writer(out);
+    out.write_record(HEADER.split(','))?;
     let mut rows = 0;
-    let mut buffer = ryu::Buffer::new();
     for (k, (step, turn)) in sequence.steps.iter().zip(sequence.turns()).enumerate() {
         if !kept(step) {
             continue;
         }
         // The time is printed in whole hundredths, because 0.01 times a count would show rounding.
-        write!(out, "{}.{:02}", k / 100, k % 100)?;
-        for value in step.specific_force.iter().chain(&step.angular_rate) {
-            write!(out, ",{}", buffer.format(*value))?;
-        }
+        let time = format!("{}.{:02}", k / 100, k % 100);
         let [left, right] = step.wheels;
         let [left_rate, right_rate] = sequence.wheel_rates(step);
         let [x, y] = step.position;
         let rest = [turn / DT, right_rate, left_rate, step.fog, left, right, x, y, step.yaw];
-        for value in rest {
-            write!(out, ",{}", buffer.format(value))?;
-        }
-        if sequence.has_vendor {
-            write!(out, ",{}", buffer.format(step.vendor_yaw))?
-        } else {
-            write!(out, ",")?
-        }
-        writeln!(out)?;
+        let vendor_yaw = sequence.has_vendor.then_some(step.vendor_yaw);
+        out.serialize((time, step.specific_force, step.angular_rate, rest, vendor_yaw))?;
         rows += 1;
     }
     out.flush()?;

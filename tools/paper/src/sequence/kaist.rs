@@ -6,31 +6,23 @@
 //! Sources: the readers irapkaist/file_player and tsyxyz/kaist2bag, and the data set's page.
 
 use super::Files;
-use super::rows::{Format, Rows};
+use super::rows::{Format, Rows, seconds};
 use super::track::{Track, Unwrap};
-use gyronet::sample::RATE_HZ;
 use gyronet_tools::drive::error::DataError;
 use std::f64::consts::PI;
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
-const NANOS: f64 = 1e9;
 /// The used columns are the quaternion x, y, z, w, and, after the Euler angles, angular rate and specific force.
-const IMU: Format = Format {
-    columns: 17,
-    used: &[1, 2, 3, 4, 8, 9, 10, 11, 12, 13],
-    stamps_per_second: NANOS,
-    nominal_hz: RATE_HZ as f64,
-};
+const IMU: Format = Format { columns: 17, used: &[1, 2, 3, 4, 8, 9, 10, 11, 12, 13], nominal_hz: 100.0 };
 /// The early sequences have only the vendor's orientation.
-const ORIENTATION: Format =
-    Format { columns: 8, used: &[1, 2, 3, 4], stamps_per_second: NANOS, nominal_hz: RATE_HZ as f64 };
+const ORIENTATION: Format = Format { columns: 8, used: &[1, 2, 3, 4], nominal_hz: 100.0 };
 /// The used column is the yaw increment.
-const FOG: Format = Format { columns: 4, used: &[3], stamps_per_second: NANOS, nominal_hz: 1000.0 };
-const ENCODER: Format = Format { columns: 3, used: &[1, 2], stamps_per_second: NANOS, nominal_hz: 100.0 };
+const FOG: Format = Format { columns: 4, used: &[3], nominal_hz: 1000.0 };
+const ENCODER: Format = Format { columns: 3, used: &[1, 2], nominal_hz: 100.0 };
 /// The used columns are r11, r21, x and y of three rows of rotation and position.
-const POSE: Format = Format { columns: 13, used: &[1, 5, 4, 8], stamps_per_second: NANOS, nominal_hz: 100.0 };
+const POSE: Format = Format { columns: 13, used: &[1, 5, 4, 8], nominal_hz: 100.0 };
 /// A wheel speed above this means that the wheel's counter was reset, m/s.
 const IMPOSSIBLE_SPEED: f64 = 100.0;
 
@@ -70,8 +62,8 @@ pub(super) fn open(folder: &Path) -> Result<Files, DataError> {
         // The nearest proper rotation has the same quotient of the two, however few digits are printed.
         [x, y, heading.angle(libm::atan2(r21, r11))]
     })?;
-    let (epoch_s, wheel_base) = (imu.epoch as f64 / NANOS, Some(parameters.base));
-    Ok(Files { epoch_s, imu, fog, wheels: encoder, truth, has_gyro, has_vendor: true, wheel_base })
+    let (epoch_s, wheel_base) = (seconds(imu.epoch), parameters.base);
+    Ok(Files { epoch_s, imu, fog, wheels: encoder, truth, has_gyro, wheel_base })
 }
 
 pub(crate) fn yaw([x, y, z, w]: [f64; 4]) -> f64 {

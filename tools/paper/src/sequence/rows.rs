@@ -14,13 +14,17 @@ const MAX_SILENCE: f64 = 600.0;
 /// Most columns of a file that are used.
 const MOST: usize = 10;
 
+/// Returns a time in s; stamps are nanoseconds since 1970.
+pub(super) fn seconds(stamps: i64) -> f64 {
+    stamps as f64 / 1e9
+}
+
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Format {
     /// Number of columns, including that of the stamp.
     pub columns: usize,
     /// Indices of the used columns; the stamp is column 0.
     pub used: &'static [usize],
-    pub stamps_per_second: f64,
     pub nominal_hz: f64,
 }
 
@@ -54,17 +58,13 @@ impl Rows {
             .trim(csv::Trim::All)
             .buffer_capacity(1 << 16)
             .from_reader(file);
-        let summary = StreamSummary::new(path, format.stamps_per_second, format.nominal_hz);
+        let summary = StreamSummary::new(path, format.nominal_hz);
         let record = ByteRecord::new();
         Ok(Self { path: name, format, csv, record, last: None, cut_at, summary })
     }
 
     pub fn path(&self) -> &str {
         &self.path
-    }
-
-    pub fn seconds(&self, stamps: i64) -> f64 {
-        stamps as f64 / self.format.stamps_per_second
     }
 
     /// Returns the next good row. Skipped rows are counted in the summary.
@@ -106,7 +106,7 @@ impl Rows {
                 if stamp < last {
                     return Err(self.refused(line, format!("time goes backwards from {last} to {stamp}")));
                 }
-                let seconds = self.seconds(stamp - last);
+                let seconds = seconds(stamp - last);
                 if seconds > MAX_SILENCE {
                     // The rows after it belong to another drive.
                     let most = format!("a gap of a drive is at most {MAX_SILENCE} s long");

@@ -1,5 +1,6 @@
 //! Summarises a sequence's files and counts the skipped rows.
 
+use super::rows::seconds;
 use serde::Serialize;
 use std::fmt;
 use std::path::Path;
@@ -22,7 +23,7 @@ impl Seen {
     }
 }
 
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct StreamSummary {
     pub file: String,
     pub rows: u64,
@@ -44,28 +45,19 @@ pub struct StreamSummary {
     clock: Clock,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 struct Clock {
-    per_second: f64,
     nominal_hz: f64,
     first: Option<i64>,
     last: i64,
 }
 
 impl StreamSummary {
-    pub(crate) fn new(path: &Path, per_second: f64, nominal_hz: f64) -> Self {
+    pub(crate) fn new(path: &Path, nominal_hz: f64) -> Self {
         Self {
             file: path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default(),
-            rows: 0,
-            rate_hz: 0.0,
-            gaps: 0,
-            longest_gap_s: 0.0,
-            duplicates: Seen::default(),
-            not_finite: Seen::default(),
-            cut: Seen::default(),
-            resets: Seen::default(),
-            ends_early_s: 0.0,
-            clock: Clock { per_second, nominal_hz, first: None, last: 0 },
+            clock: Clock { nominal_hz, ..Clock::default() },
+            ..Self::default()
         }
     }
 
@@ -76,17 +68,17 @@ impl StreamSummary {
             (clock.first, clock.last) = (Some(stamp), stamp);
             return;
         };
-        let seconds = (stamp - clock.last) as f64 / clock.per_second;
+        let silence = seconds(stamp - clock.last);
         clock.last = stamp;
-        self.rate_hz = (self.rows - 1) as f64 * clock.per_second / (stamp - first) as f64;
-        self.gaps += u64::from(seconds * clock.nominal_hz > GAP_PERIODS);
-        self.longest_gap_s = self.longest_gap_s.max(seconds);
+        self.rate_hz = (self.rows - 1) as f64 / seconds(stamp - first);
+        self.gaps += u64::from(silence * clock.nominal_hz > GAP_PERIODS);
+        self.longest_gap_s = self.longest_gap_s.max(silence);
     }
 }
 
 /// Compares the ends of files whose stamps are of one clock.
 pub(super) fn compare_ends(files: &mut [StreamSummary; 4]) {
-    let end = |file: &StreamSummary| file.clock.last as f64 / file.clock.per_second;
+    let end = |file: &StreamSummary| seconds(file.clock.last);
     let last = files.iter().map(end).fold(0.0, f64::max);
     for file in files {
         file.ends_early_s = last - end(file);

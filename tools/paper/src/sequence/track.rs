@@ -4,7 +4,7 @@
 //! Increments (angle of a gyro, distance of a wheel) are streams of their sums, so that nothing is lost or counted
 //! twice, whatever the stamps are.
 
-use super::rows::{Row, Rows};
+use super::rows::{Row, Rows, seconds};
 use super::summary::StreamSummary;
 use gyronet_tools::drive::error::{DataError, DataFault};
 
@@ -40,7 +40,7 @@ impl<const M: usize> Track<M> {
         let first = rows.next_row()?;
         let Some(row) = first else { return Err(DataError::of(rows.path(), DataFault::Empty)) };
         let epoch = epoch.unwrap_or(row.stamp);
-        let time = rows.seconds(row.stamp - epoch);
+        let time = seconds(row.stamp - epoch);
         let mut convert: Convert<M> = Box::new(convert);
         let now = (time, convert(&row, time, &mut rows.summary));
         Ok(Self { rows, convert, epoch, first: time, before: now, after: now })
@@ -49,7 +49,7 @@ impl<const M: usize> Track<M> {
     fn advance(&mut self) -> Result<bool, DataError> {
         let Some(row) = self.rows.next_row()? else { return Ok(false) };
         self.before = self.after;
-        let time = self.rows.seconds(row.stamp - self.epoch);
+        let time = seconds(row.stamp - self.epoch);
         self.after = (time, (self.convert)(&row, time, &mut self.rows.summary));
         Ok(true)
     }

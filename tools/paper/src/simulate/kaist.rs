@@ -1,12 +1,10 @@
 //! Writes the layout of KAIST Complex Urban: no headers, nanoseconds since 1970.
 
 use super::delay::Delay;
-use super::text::Rows;
-use super::vehicles::KAIST;
+use super::odometer::{BASE, DIAMETER};
 use super::{Drive, Spec};
-use crate::simulate::odometer;
 use gyronet_tools::drive::DT;
-use std::fs;
+use std::fs::{self, File};
 use std::io;
 use std::path::Path;
 
@@ -24,13 +22,13 @@ const FIELD: ([f64; 3], f64) = ([0.0, 0.6, -0.8], 0.003);
 pub(super) fn write(spec: &Spec, mut drive: Drive, folder: &Path) -> io::Result<()> {
     let data = folder.join("sensor_data");
     fs::create_dir_all(&data)?;
-    calibration(&KAIST.wheels, &folder.join("calibration"))?;
-    let mut imu_rows = Rows::create(&data.join("xsens_imu.csv"))?;
-    let mut fog_rows = Rows::create(&data.join("fog.csv"))?;
-    let mut encoder_rows = Rows::create(&data.join("encoder.csv"))?;
-    let mut pose_rows = Rows::create(&folder.join("global_pose.csv"))?;
+    calibration(&folder.join("calibration"))?;
+    let mut imu_rows = rows(&data.join("xsens_imu.csv"))?;
+    let mut fog_rows = rows(&data.join("fog.csv"))?;
+    let mut encoder_rows = rows(&data.join("encoder.csv"))?;
+    let mut pose_rows = rows(&folder.join("global_pose.csv"))?;
     let [mut imu_delay, mut fog_delay, mut encoder_delay] =
-        [1, 2, 3].map(|stream| Delay::new(KAIST.stamp_delay, spec.run, stream));
+        [1, 2, 3].map(|stream| Delay::new(spec.run, stream));
     let stamp = |seconds: f64| START_NS + (seconds * 1e9).round() as i64;
     let mut heading = None;
     for _ in 0..drive.ticks {
@@ -41,7 +39,7 @@ pub(super) fn write(spec: &Spec, mut drive: Drive, folder: &Path) -> io::Result<
         for k in 1..=INCREMENTS {
             let time = truth.seconds + f64::from(k) * span;
             let increment = drive.fog.increment(rate, span);
-            fog_rows.int(stamp(fog_delay.arrival(time))).singles(increment).end()?;
+            fog_rows.serialize((stamp(fog_delay.arrival(time)), increment.map(single)))?;
         }
         drive.fog.wander(DT);
         drive.odometer.step(motion.speed, motion.acceleration, motion.heading_rate, DT);
@@ -53,29 +51,41 @@ pub(super) fn write(spec: &Spec, mut drive: Drive, folder: &Path) -> io::Result<
         *yaw += rate[2] * DT;
         let attitude = [motion.roll, motion.pitch, *yaw];
         let magnetic = drive.magnetic(&truth, FIELD.0, FIELD.1);
-        imu_rows.int(stamp(imu_delay.arrival(now))).singles(quaternion(attitude)).singles(attitude);
-        imu_rows.singles(rate).singles(force).singles(magnetic).end()?;
+        let measured = [attitude, rate, force, magnetic].map(|axes| axes.map(single));
+        let quaternion = quaternion(attitude).map(single);
+        imu_rows.serialize((stamp(imu_delay.arrival(now)), quaternion, measured))?;
 
         let counts = drive.odometer.turns().map(|turns| (turns * RESOLUTION).floor() as i64);
-        encoder_rows.int(stamp(encoder_delay.arrival(now))).int(counts[0]).int(counts[1]).end()?;
+        encoder_rows.serialize((stamp(encoder_delay.arrival(now)), counts))?;
 
-        pose_rows.int(stamp(now));
-        for (row, place) in truth.rotation().iter().zip(0..3) {
-            pose_rows.doubles(*row).double(ORIGIN[place] + truth.position[place]);
-        }
-        pose_rows.end()?;
+        let (rotation, place) = (truth.rotation(), truth.position);
+        let pose = [0, 1, 2].map(|k| (rotation[k].map(double), double(ORIGIN[k] + place[k])));
+        pose_rows.serialize((stamp(now), pose))?;
     }
-    [imu_rows, fog_rows, encoder_rows, pose_rows].into_iter().try_for_each(Rows::finish)
+    [imu_rows, fog_rows, encoder_rows, pose_rows].iter_mut().try_for_each(csv::Writer::flush)
 }
 
-fn calibration(wheels: &odometer::Config, folder: &Path) -> io::Result<()> {
+fn rows(path: &Path) -> io::Result<csv::Writer<File>> {
+    Ok(csv::WriterBuilder::new().has_headers(false).from_path(path)?)
+}
+
+/// Rounds to an f32; adding zero makes -0 a 0.
+fn single(value: f64) -> f32 {
+    value as f32 + 0.0
+}
+
+/// Rounds to 1e-9.
+fn double(value: f64) -> f64 {
+    (value * 1e9).round() / 1e9 + 0.0
+}
+
+fn calibration(folder: &Path) -> io::Result<()> {
     fs::create_dir_all(folder)?;
-    let [left, right] = wheels.diameter;
+    let [left, right] = DIAMETER;
     let text = format!(
         "Encoder calibrated parameter\nEncoder resolution: {RESOLUTION}\n\
          Encoder left wheel diameter: {left}\nEncoder right wheel diameter: {right}\n\
-         Encoder wheel base: {}\n",
-        wheels.base
+         Encoder wheel base: {BASE}\n"
     );
     fs::write(folder.join("EncoderParameter.txt"), text)
 }

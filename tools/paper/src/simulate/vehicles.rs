@@ -1,6 +1,6 @@
 //! Defines the simulated vehicle and its sensors, with the source of every parameter.
 //!
-//! Those of the route are in `town.rs`. No parameter was tuned to a result. (M) marks values recalled from a data
+//! Those of the route are in `town.rs`, of the wheels in `odometer.rs`. No parameter was tuned to a result. (M) marks values recalled from a data
 //! sheet that was not available; (A) marks assumptions where nothing is published.
 //!
 //! | what | value | source |
@@ -26,7 +26,7 @@
 //! | KAIST latitude | 36.37 deg N | Daejeon |
 //! | KAIST delay of a stamp | 0.1 ms, exponential | (A): it is small in the paper's Fig. 11 |
 
-use super::{fog, odometer, world};
+use super::fog;
 use gyronet_tools::simulate::{car, mems};
 
 /// 1 deg/h in rad/s.
@@ -36,52 +36,33 @@ const DEG: f64 = std::f64::consts::PI / 180.0;
 /// sqrt(1 h) in sqrt(s).
 const ROOT_HOUR: f64 = 60.0;
 
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Vehicle {
-    pub world: world::Config,
-    pub mems: mems::Config,
-    pub fog: fog::Config,
-    pub wheels: odometer::Config,
-    /// Mean delay of a message's stamp, s.
-    pub stamp_delay: f64,
-}
-
-pub const KAIST: Vehicle = Vehicle {
-    world: world::Config {
-        car: car::Config {
-            wheel_radius: 0.311,
-            track: 1.5285,
-            road_grade: 0.03,
-            road_bank: 0.015,
-            bank_waves: [223.0, 71.0],
-            ..car::Config::DEFAULT
-        },
-        cornering_stiffness: 20.0,
-        latitude_deg: 36.37,
-    },
-    mems: mems::Config {
-        gyro_bias: 0.25 * DEG,
-        accel_bias: 0.03,
-        scale: 0.001,
-        misalignment: 0.05 * DEG,
-        gyro_per_force: 0.003 * DEG / 9.806_65,
-        mount: [0.0, 0.0],
-        ..mems::Config::DEFAULT
-    },
-    fog: fog::Config {
-        angle_walk: 0.012 * DEG / ROOT_HOUR,
-        device_bias: 0.25 * DEG_PER_HOUR,
-        run_bias: 0.05 * DEG_PER_HOUR,
-        bias_walk: 0.05 * DEG_PER_HOUR / ROOT_HOUR,
-        scale: 200e-6,
-        misalignment: 0.4e-3,
-    },
-    wheels: odometer::Config {
-        diameter: [0.623_022, 0.622_356],
-        base: 1.5285,
-        common_error: 0.0006,
-        wheel_error: 0.000_03,
-        slip_stiffness: 30.0,
-    },
-    stamp_delay: 1e-4,
+pub const CAR: car::Config = car::Config {
+    wheel_radius: 0.311,
+    track: 1.5285,
+    road_grade: 0.03,
+    road_bank: 0.015,
+    bank_waves: [223.0, 71.0],
+    ..car::Config::DEFAULT
 };
+
+pub const MEMS: mems::Config = mems::Config {
+    gyro_bias: 0.25 * DEG,
+    accel_bias: 0.03,
+    scale: 0.001,
+    misalignment: 0.05 * DEG,
+    gyro_per_force: 0.003 * DEG / 9.806_65,
+    mount: [0.0, 0.0],
+    ..mems::Config::DEFAULT
+};
+
+pub const FOG: fog::Config = fog::Config {
+    angle_walk: 0.012 * DEG / ROOT_HOUR,
+    device_bias: 0.25 * DEG_PER_HOUR,
+    run_bias: 0.05 * DEG_PER_HOUR,
+    bias_walk: 0.05 * DEG_PER_HOUR / ROOT_HOUR,
+    scale: 200e-6,
+    misalignment: 0.4e-3,
+};
+
+/// Latitude of the simulated world, deg.
+pub const LATITUDE_DEG: f64 = 36.37;

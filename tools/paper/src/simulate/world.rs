@@ -8,6 +8,7 @@
 //! (Rajamani, Vehicle Dynamics and Control, chapter 2): the course over ground differs from the heading.
 
 use super::town::Town;
+use super::vehicles::{CAR, LATITUDE_DEG};
 use gyronet_tools::drive::DT;
 use gyronet_tools::simulate::car::{self, Car, GRAVITY, Motion};
 use gyronet_tools::simulate::vibration::{Shake, Vibration};
@@ -15,13 +16,8 @@ use gyronet_tools::simulate::vibration::{Shake, Vibration};
 /// Rotation rate of the Earth, rad/s (WGS 84).
 pub const EARTH_RATE: f64 = 7.292_115e-5;
 
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Config {
-    pub car: car::Config,
-    /// Normalised cornering stiffness of the rear axle: lateral acceleration over g for 1 rad.
-    pub cornering_stiffness: f64,
-    pub latitude_deg: f64,
-}
+/// Normalised cornering stiffness of the rear axle: lateral acceleration over g for 1 rad.
+const CORNERING_STIFFNESS: f64 = 20.0;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Truth {
@@ -52,7 +48,6 @@ impl Truth {
 /// An endless iterator over the truth of a drive, every 10 ms.
 #[derive(Debug, Clone)]
 pub struct World {
-    config: Config,
     car: Car<Town>,
     vibration: Vibration,
     tick: u32,
@@ -62,10 +57,9 @@ pub struct World {
 
 impl World {
     /// Starts at rest with the heading `yaw`.
-    pub fn new(config: &Config, way: Town, yaw: f64, run: u64) -> Self {
+    pub fn new(way: Town, yaw: f64, run: u64) -> Self {
         Self {
-            config: *config,
-            car: Car::on(&config.car, way, run),
+            car: Car::on(&CAR, way, run),
             vibration: Vibration::new(run),
             tick: 0,
             position: [0.0; 3],
@@ -77,7 +71,7 @@ impl World {
         let before = self.yaw;
         self.yaw += motion.heading_rate * DT;
         let lateral = motion.speed * motion.heading_rate;
-        let side_slip = lateral / (GRAVITY * self.config.cornering_stiffness);
+        let side_slip = lateral / (GRAVITY * CORNERING_STIFFNESS);
         let course = (before + self.yaw) / 2.0 - side_slip;
         let level = motion.speed * libm::cos(motion.grade) * DT;
         self.position[0] += level * libm::cos(course);
@@ -98,7 +92,7 @@ impl Iterator for World {
         let (position, yaw) = (self.position, self.yaw);
         let inertial_rate = motion.angular_rate;
         let mut truth = Truth { seconds, position, yaw, motion, inertial_rate, shake };
-        let latitude = self.config.latitude_deg.to_radians();
+        let latitude = LATITUDE_DEG.to_radians();
         let earth =
             truth.in_vehicle([0.0, EARTH_RATE * libm::cos(latitude), EARTH_RATE * libm::sin(latitude)]);
         truth.inertial_rate = gyronet_tools::simulate::add(motion.angular_rate, earth);

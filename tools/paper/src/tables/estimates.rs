@@ -53,10 +53,8 @@ pub fn run(sequence: &Sequence, network: &mut impl WindowNetwork) -> Estimates {
     if sequence.has_vendor {
         estimates.add(Method::VENDOR, rates(sequence.steps.iter().map(|step| step.vendor_yaw)));
     }
-    if let Some(base) = sequence.wheel_base {
-        let turn = |step: &sequence::Step| (step.wheels[1] - step.wheels[0]) / base;
-        estimates.add(Method::WHEELS, sequence.steps.iter().map(|step| turn(step) / DT).collect());
-    }
+    let by_wheels = |step: &sequence::Step| (step.wheels[1] - step.wheels[0]) / sequence.wheel_base;
+    estimates.add(Method::WHEELS, sequence.steps.iter().map(|step| by_wheels(step) / DT).collect());
     let fog: Vec<f64> = sequence.steps.iter().map(|step| step.fog / DT).collect();
     estimates.add(Method::FOG, fog.clone());
     let earth = EARTH_RATE * libm::sin(sequence.latitude_deg().to_radians());
@@ -74,7 +72,7 @@ impl Estimates {
             return;
         }
         let fits = fog_replay::check_weights(sequence, trained);
-        if let Err(error) = fits {
+        if let Err(error) = &fits {
             let before = self.refused.take().map(|before| before + "; ").unwrap_or_default();
             self.refused = Some(format!("{before}FoGNet's weights were not run: {error}"));
         }
@@ -83,7 +81,7 @@ impl Estimates {
         for method in [Method::FOGNET, Method::FOGNET_NOPAD] {
             let network: &mut dyn MinuteNetwork =
                 if method == Method::FOGNET { &mut *whole.0 } else { &mut whole };
-            let turns = match fits {
+            let turns = match &fits {
                 Ok(()) => fog_replay::run(&base, network, FogConfig::DEFAULT).turns,
                 Err(_) => base.steps.iter().map(|step| step.fog).collect(),
             };

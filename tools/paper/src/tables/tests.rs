@@ -39,14 +39,14 @@ fn exact() -> Sequence {
             vendor_yaw: track.yaw,
         }
     };
-    let file = || StreamSummary::new(&PathBuf::from("a.csv"), 1e9, 100.0);
+    let file = || StreamSummary::new(&PathBuf::from("a.csv"), 100.0);
     Sequence {
         name: "urban18".into(),
         path: PathBuf::from("urban18"),
         simulated: None,
         has_gyro: true,
         has_vendor: true,
-        wheel_base: None,
+        wheel_base: 1.5,
         latitude: None,
         start_s: 1.5e9,
         origin: [0.0; 2],
@@ -92,7 +92,6 @@ fn each_method_does_what_it_says() {
 #[test]
 fn wheels_alone_turn_by_their_difference() {
     let mut sequence = exact();
-    sequence.wheel_base = Some(1.5);
     for step in &mut sequence.steps {
         let [left, right] = &mut step.wheels;
         (*left, *right) = (*left - 0.75 * step.fog, *right + 0.75 * step.fog);
@@ -102,7 +101,7 @@ fn wheels_alone_turn_by_their_difference() {
     let wheels = errors.methods["wheels"];
     assert!(wheels.final_unwrapped_rad < 1e-9 && wheels.ate_m < 1e-6, "{wheels:?}");
     // A wheel base that is wrong by a tenth makes the turn wrong by a tenth.
-    sequence.wheel_base = Some(1.5 / 1.1);
+    sequence.wheel_base = 1.5 / 1.1;
     let estimates = estimates::run(&sequence, &mut Uncorrected);
     let errors = SequenceErrors::new(&sequence, &estimates);
     let turned: f64 = sequence.turns()[300..].iter().sum();
