@@ -3,17 +3,14 @@
 //!
 //! A tester waits for a flow control frame after as many frames as a ring can hold, so that none is lost however long
 //! idle is preempted. Responses are sent after the waiting rates.
-#![allow(unsafe_code, reason = "rings with one task at each end; each block names them")]
 
-use crate::frames;
-use crate::output;
+use crate::queues::{FROM_CAN, FROM_SLCAN, Line, RESPONSES, ids, is_request};
 use crate::regions::{Records, Weights};
-use crate::ring::Ring;
-use crate::serial;
 use crate::stm32f405::{can, rng, timer};
-use core::sync::atomic::{AtomicU32, Ordering};
+use crate::{frames, serial, tasks};
+use core::sync::atomic::Ordering;
 use cortex_m::peripheral::SCB;
-use embedded_can::{Frame, Id};
+use embedded_can::Frame;
 use embedded_io::Write;
 use gyronet::can::DataFrame;
 use gyronet::can::identifier::{packed, unpacked};
@@ -23,41 +20,6 @@ use gyronet::service::Device;
 use gyronet::service::message::AllCounters;
 use gyronet::uds::Server;
 use gyronet::units::Micros;
-
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub enum Line {
-    Can,
-    Slcan,
-    Service,
-}
-
-pub static FROM_CAN: Ring<DataFrame, 16> =
-    // SAFETY: the receive interrupt writes, idle reads.
-    unsafe { Ring::new() };
-pub static FROM_SLCAN: Ring<DataFrame, 16> =
-    // SAFETY: the output task writes, idle reads.
-    unsafe { Ring::new() };
-pub static RESPONSES: Ring<(Line, DataFrame), 16> =
-    // SAFETY: idle writes, the output task reads.
-    unsafe { Ring::new() };
-
-/// Identifiers of requests to this board, of requests to all servers, and of this board's responses, [`packed`].
-/// Set before any task runs.
-static IDS: [AtomicU32; 3] = [const { AtomicU32::new(u32::MAX) }; 3];
-
-pub fn set_ids(ids: [Id; 3]) {
-    IDS.iter().zip(ids).for_each(|(place, id)| place.store(packed(id), Ordering::Relaxed));
-}
-
-pub fn is_request(id: Id) -> bool {
-    let [request, functional, _] = ids();
-    [request, functional].contains(&packed(id))
-}
-
-fn ids() -> [u32; 3] {
-    let [request, functional, response] = &IDS;
-    [request, functional, response].map(|id| id.load(Ordering::Relaxed))
-}
 
 /// Serves one tester at a time, on any line.
 pub struct Diagnosis {
@@ -138,14 +100,14 @@ impl Diagnosis {
                 Line::Service => port.enqueue(frame, Micros(1_000 * u64::from(now))),
                 Line::Can | Line::Slcan => {
                     let _ = RESPONSES.push((*line, frame));
-                    output::attend();
+                    tasks::wake_output();
                 }
             }
         }
         if server.restart_is_due() && RESPONSES.is_empty() && !port.is_sending() {
             // The flush is bounded: a response that cannot be sent does not delay the restart.
             let _ = service.flush();
-            output::with_silence_announced(SCB::sys_reset);
+            tasks::with_silence_announced(SCB::sys_reset);
         }
     }
 }

@@ -2,13 +2,11 @@
 //!
 //! Frames that CAN receives go from the receive interrupt to the output task, or to idle if they are requests of a
 //! tester.
-#![allow(unsafe_code, reason = "rings with one task at each end; each block names them")]
 
-use crate::diagnosis::{self, FROM_CAN, Line, RESPONSES};
-use crate::idle::{self, OBSERVATIONS, Observation, STEP_MS};
-use crate::ring::Ring;
+use crate::queues::{FRAMES, FROM_CAN, Line, OBSERVATIONS, Observation, RESPONSES, is_request};
 use crate::serial;
 use crate::stm32f405::can::{self, Can, Received, STALE_MS, State};
+use crate::tasks::{IDLE_STEP_MS, wake_idle};
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use embedded_can::Frame as _;
 use gyronet::can::DataFrame;
@@ -22,10 +20,6 @@ use gyronet::units::Micros;
 
 const QUEUE: usize = 24;
 
-/// Waiting wheel, course and latitude frames; the output task reads them every millisecond.
-pub static FRAMES: Ring<DataFrame, 8> =
-    // SAFETY: the receive interrupt writes, the output task reads.
-    unsafe { Ring::new() };
 /// Number of frames that found no room, in the controller or here. Only the handler counts.
 static LOST: AtomicU32 = AtomicU32::new(0);
 
@@ -47,8 +41,8 @@ pub fn take() {
 
 /// Queues a frame for its task. Returns whether there was room.
 fn push(frame: DataFrame) -> bool {
-    if diagnosis::is_request(frame.id()) {
-        idle::attend();
+    if is_request(frame.id()) {
+        wake_idle();
         FROM_CAN.push(frame)
     } else {
         FRAMES.push(frame)
@@ -140,11 +134,11 @@ impl Outgoing {
 
     fn attend(&mut self) {
         self.attended = self.now;
-        idle::attend();
+        wake_idle();
     }
 
     pub fn attend_if_due(&mut self) {
-        if self.now.wrapping_sub(self.attended) >= STEP_MS {
+        if self.now.wrapping_sub(self.attended) >= IDLE_STEP_MS {
             self.attend();
         }
     }

@@ -1,24 +1,19 @@
 //! The idle task runs diagnosis and checks the weights against their checksum.
-#![allow(unsafe_code, reason = "rings with one task at each end; each block names them")]
 
 use crate::crash;
 use crate::diagnosis::Diagnosis;
 use crate::imu::{self, BringUp};
-use crate::output;
+use crate::queues::{OBSERVATIONS, Observation};
 use crate::regions::{Records, Weights};
-use crate::ring::Ring;
 use crate::stm32f405::{can, clocks, timer};
-use core::sync::atomic::{AtomicBool, Ordering};
+use crate::tasks::{self, ATTENTION, IDLE_STEP_MS};
+use core::sync::atomic::Ordering;
 use cortex_m::peripheral::SCB;
 use gyronet::coprocessor::Coprocessor;
-use gyronet::health::{Faults, Quality, Status};
 use gyronet::model::background::BackgroundCheck;
-use gyronet::mounting::Vertical;
-use gyronet::sample::{ImuSample, WheelSample};
 use gyronet::service::Device;
 use gyronet::service::event::{ClockFault, SensorFault};
 use gyronet::service::message::{AllCounters, LineCounters};
-use gyronet::standstill::Standing;
 use rtic::mutex_prelude::*;
 
 /// Interval between checks of a failed clock, ms.
@@ -27,54 +22,8 @@ const RETRY_MS: u32 = 1_000;
 const COURSE_MS: u32 = 100;
 /// Time after which a start has not failed, ms.
 const SETTLED_MS: u32 = 60_000;
-/// Longest time from one step of idle to the next without an input or a request, ms.
-pub const STEP_MS: u32 = 10;
 /// Duration of one pass over the weights, ms.
 const CHECK_MS: usize = 10_000;
-
-pub struct Observation {
-    /// `None`: the sensor is silent.
-    pub sample: Option<ImuSample>,
-    pub tick: u32,
-    pub status: Status,
-    pub quality: Quality,
-    pub faults: Faults,
-    pub wheels: WheelSample,
-    pub standing: Standing,
-    pub vertical: Option<Vertical>,
-}
-
-/// Observations that idle has not processed yet.
-pub static OBSERVATIONS: Ring<Observation, 8> =
-    // SAFETY: the output task writes, idle reads.
-    unsafe { Ring::new() };
-
-static ATTENTION: AtomicBool = AtomicBool::new(false);
-
-/// Lets idle work when it next runs: an observation or a frame of a tester has come, or [`STEP_MS`] have passed.
-pub fn attend() {
-    ATTENTION.store(true, Ordering::Relaxed);
-}
-
-pub struct Found {
-    weights_damaged: bool,
-    mount_moved: bool,
-}
-
-impl Found {
-    pub fn any(&self) -> bool {
-        self.weights_damaged || self.mount_moved
-    }
-
-    pub fn report(&self, coprocessor: &mut Coprocessor) {
-        if self.weights_damaged {
-            coprocessor.weights_damaged();
-        }
-        if self.mount_moved {
-            coprocessor.mount_moved();
-        }
-    }
-}
 
 pub struct Idle {
     device: &'static mut Device<Records, Weights>,
@@ -90,8 +39,6 @@ pub struct Idle {
     course_at: u32,
     /// Time of the last step, ms.
     stepped: u32,
-    /// A tester is being served.
-    is_busy: bool,
 }
 
 pub type Stored = (&'static mut Device<Records, Weights>, Option<BackgroundCheck<'static>>);
@@ -114,22 +61,16 @@ impl Idle {
             retried: 0,
             course_at: 0,
             stepped: 0,
-            is_busy: false,
         }
     }
 
-    #[inline]
-    pub fn is_due(&self) -> bool {
-        ATTENTION.load(Ordering::Relaxed) || self.is_busy
-    }
-
-    /// Does a bounded piece of work, and returns the faults that were found.
+    /// Does a bounded piece of work, and tells the coprocessor what it has found.
     #[inline(never)]
     pub fn step(
         &mut self,
         coprocessor: &mut impl Mutex<T = &'static mut Coprocessor>,
         lines: &mut impl Mutex<T = LineCounters>,
-    ) -> Found {
+    ) {
         ATTENTION.store(false, Ordering::Relaxed);
         self.observe();
         let now = timer::milliseconds();
@@ -148,18 +89,24 @@ impl Idle {
         }
         let windows = coprocessor.lock(|coprocessor| coprocessor.pipeline().counters().windows);
         self.diagnosis.step(self.device, || {
-            (coprocessor, lines).lock(|coprocessor, lines| AllCounters::of(coprocessor, lines))
+            (&mut *coprocessor, lines).lock(|coprocessor, lines| AllCounters::of(coprocessor, lines))
         });
         self.retry_clock(now);
         if self.device.firmware_trial(can::is_acknowledged(), windows, now) {
-            output::with_silence_announced(SCB::sys_reset);
+            tasks::with_silence_announced(SCB::sys_reset);
         }
         if before < SETTLED_MS && now >= SETTLED_MS {
             crash::settled();
         }
-        let weights_damaged = self.check(now.wrapping_sub(before));
-        self.is_busy = self.diagnosis.is_busy();
-        Found { weights_damaged, mount_moved: self.device.take_mount_moved() }
+        if self.check(now.wrapping_sub(before)) {
+            coprocessor.lock(|coprocessor| coprocessor.weights_damaged());
+        }
+        if self.device.take_mount_moved() {
+            coprocessor.lock(|coprocessor| coprocessor.mount_moved());
+        }
+        if self.diagnosis.is_busy() {
+            tasks::wake_idle();
+        }
     }
 
     #[inline(never)]
@@ -185,7 +132,7 @@ impl Idle {
 
     /// Checks the piece of the weights in use for some milliseconds, and returns whether they were found to be damaged.
     fn check(&mut self, milliseconds: u32) -> bool {
-        let pieces = milliseconds.min(2 * STEP_MS) as usize;
+        let pieces = milliseconds.min(2 * IDLE_STEP_MS) as usize;
         if pieces == 0 {
             return false;
         }

@@ -6,7 +6,7 @@
 use crate::ring::Ring;
 use crate::stm32f405::spi::Spi;
 use crate::stm32f405::timer;
-use crate::{output, serial};
+use crate::{serial, tasks};
 use core::sync::atomic::{AtomicU16, Ordering};
 use embedded_hal::delay::DelayNs;
 use gyronet::sample::ImuSample;
@@ -141,8 +141,8 @@ struct Delay;
 
 impl DelayNs for Delay {
     fn delay_ns(&mut self, ns: u32) {
-        output::wait(u64::from(ns.div_ceil(1_000)) + 1, || {
-            output::report(output::Task::Idle);
+        tasks::wait(u64::from(ns.div_ceil(1_000)) + 1, || {
+            tasks::report(tasks::Task::Idle);
             false
         });
     }

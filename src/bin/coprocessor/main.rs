@@ -39,12 +39,14 @@ mod frames;
 mod idle;
 mod imu;
 mod output;
+mod queues;
 mod regions;
 mod ring;
 mod serial;
 mod start;
 #[path = "../stm32f405/mod.rs"]
 mod stm32f405;
+mod tasks;
 
 /// Vector and priority of each task below as data, because the stack analysis reads them there and RTIC encodes them
 /// only in instructions. A test compares them with the running image.
@@ -76,11 +78,13 @@ static PRIORITIES: [[u8; 2]; 12] = {
 #[rtic::app(device = crate::stm32f405::pac, peripherals = true)]
 mod app {
     use crate::diagnosis::Diagnosis;
-    use crate::idle::{Idle, attend};
+    use crate::idle::Idle;
     use crate::imu::BringUp;
-    use crate::output::{Output, Task, attend as attend_output, is_due, report};
+    use crate::output::Output;
+    use crate::queues::FRAMES;
     use crate::stm32f405::pac::Interrupt;
     use crate::stm32f405::{can, timer};
+    use crate::tasks::{Task, is_idle_due, is_output_due, report, wake_idle, wake_output};
     use crate::{board, crash, frames, serial, start};
     use core::mem::MaybeUninit;
     use cortex_m::asm::dsb;
@@ -162,15 +166,15 @@ mod app {
             reception.as_mut().is_some_and(|reception| reception.count(elapsed))
         };
         let [imu, slcan, fog, gnss, service] = cx.local.receptions;
-        let has_work = is_due(now) | count(imu);
+        let has_work = is_output_due(now) | count(imu);
         let has_input = count(slcan) | count(fog) | count(gnss);
         if count(service) {
-            attend();
+            wake_idle();
         }
         report(Task::Tick);
         if has_input {
             // The task may have run in this millisecond already, and then leaves these lines to the next.
-            attend_output();
+            wake_output();
         } else if has_work {
             rtic::pend(Interrupt::SPI3);
         }
@@ -201,7 +205,7 @@ mod app {
     #[task(binds = CAN1_RX0, priority = 3)]
     fn can_received(_: can_received::Context) {
         frames::take();
-        if !frames::FRAMES.is_empty() {
+        if !FRAMES.is_empty() {
             rtic::pend(Interrupt::SPI3);
         }
         dsb();
@@ -219,7 +223,7 @@ mod app {
     #[task(binds = CAN1_SCE, priority = 3)]
     fn can_went_off(_: can_went_off::Context) {
         can::went_off();
-        attend_output();
+        wake_output();
         dsb();
     }
 
@@ -266,11 +270,8 @@ mod app {
     fn idle(cx: idle::Context) -> ! {
         let idle::SharedResources { mut coprocessor, mut lines, .. } = cx.shared;
         loop {
-            if cx.local.rest.is_due() {
-                let found = cx.local.rest.step(&mut coprocessor, &mut lines);
-                if found.any() {
-                    coprocessor.lock(|coprocessor| found.report(coprocessor));
-                }
+            if is_idle_due() {
+                cx.local.rest.step(&mut coprocessor, &mut lines);
             }
             report(Task::Idle);
             // Every interrupt ends the sleep, the next tick at the latest.

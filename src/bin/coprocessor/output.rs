@@ -1,19 +1,14 @@
 //! The output task: moves samples and frames between the lines and the coprocessor. Nothing in it waits.
-//!
-//! It also announces that the buses will be silent, because the flash is erased or the board restarts. Idle requests the
-//! announcement and waits for it; from then on the task sends message sets without a rate, until idle's work is done. A
-//! receiver can tell from them that the silence is intended.
 
 use crate::boards::BOARD;
-use crate::diagnosis::{self, FROM_SLCAN};
-use crate::frames::{self, FRAMES, Outgoing};
-use crate::idle;
+use crate::frames::{self, Outgoing};
 use crate::imu::{BYTES_PER_STEP, Imu};
+use crate::queues::{FRAMES, FROM_SLCAN, is_request};
 use crate::serial;
 use crate::stm32f405::can::{Can, State};
-use crate::stm32f405::pac::Interrupt;
 use crate::stm32f405::{timer, watchdog};
-use core::sync::atomic::{AtomicU8, AtomicU32, Ordering};
+use crate::tasks::{self, LEAVE_US, QUIET_UNTIL};
+use core::sync::atomic::Ordering;
 use embedded_can::Frame as _;
 use gyronet::coprocessor::Coprocessor;
 use gyronet::heading::{GnssLine, GnssSettings};
@@ -26,56 +21,10 @@ use gyronet::units::Micros;
 
 /// Time after a sample in which the tick runs the task for received bytes only, us. A sensor counts as silent later.
 const QUIET_US: u32 = 20_000;
-static QUIET_UNTIL: AtomicU32 = AtomicU32::new(0);
-
-/// Returns whether the task is to run at `now`, us, even if nothing has come.
-#[inline]
-pub fn is_due(now: u32) -> bool {
-    now.wrapping_sub(QUIET_UNTIL.load(Ordering::Relaxed)) as i32 >= 0
-}
-
-/// Runs the task now and with the next tick: something other than an input waits for it.
-pub fn attend() {
-    QUIET_UNTIL.store(timer::micros() as u32, Ordering::Relaxed);
-    rtic::pend(Interrupt::SPI3);
-}
-
 /// Interval at which the counters of the lines are summed and the watchdog is fed, ms.
 const SLOW_MS: u32 = 6;
 /// Half a period of the LED, ms; a power of two.
 const BLINK_MS: u32 = 512;
-
-/// In this state, the output task sends rates.
-const RUNNING: u8 = 0;
-/// In this state, idle waits for the announcement.
-const REQUESTED: u8 = 1;
-/// In this state, a message set without a rate has been queued.
-const ANNOUNCED: u8 = 2;
-/// Limits how long idle waits for the output task's announcement, us.
-const ANNOUNCE_US: u64 = 20_000;
-/// Time for the frames to be sent, us; six frames take 1.7 ms. Then each millisecond shows whether one is stale.
-const LEAVE_US: u64 = 5_000;
-/// More interrupts than come in a millisecond, so that a wait ends even if the timer stands still.
-const WAKES_PER_MS: u64 = 1_000;
-
-static STATE: AtomicU8 = AtomicU8::new(RUNNING);
-
-/// A task that has to report: the watchdog is fed only when all of them have run.
-#[derive(Clone, Copy)]
-#[repr(u8)]
-pub enum Task {
-    Tick = 1,
-    /// The network's task, which also reports when it has nothing to do.
-    Window = 1 << 1,
-    Idle = 1 << 2,
-}
-
-const ALL_TASKS: u8 = Task::Tick as u8 | Task::Window as u8 | Task::Idle as u8;
-static REPORTS: AtomicU8 = AtomicU8::new(0);
-
-pub fn report(task: Task) {
-    REPORTS.fetch_or(task as u8, Ordering::Relaxed);
-}
 
 pub struct Output {
     imu: Imu,
@@ -158,11 +107,11 @@ impl Output {
         if is_polled {
             self.poll_inputs(coprocessor, now);
         }
-        let is_requested = is_requested();
+        let is_requested = tasks::is_silence_requested();
         coprocessor.pause(is_requested, &mut self.outgoing);
         if is_requested {
             self.send();
-            announce();
+            tasks::silence_announced();
         }
         let is_slow = has_ticked && tick.wrapping_sub(self.reported_at) >= SLOW_MS;
         let is_behind = !self.outgoing.is_sent();
@@ -188,7 +137,7 @@ impl Output {
         has_sample || is_slow
     }
 
-    /// Lets the tick leave this task alone, where nothing waits but what will come, and nobody has called [`attend`] since
+    /// Lets the tick leave this task alone, where nothing waits but what will come, and nobody has woken it since
     /// QUIET_UNTIL was read as `asked`.
     fn rest(&self, now: Micros, asked: u32, coprocessor: &Coprocessor) {
         let now = now.0 as u32;
@@ -242,10 +191,7 @@ impl Output {
             ..self.lines
         };
         self.outgoing.attend_if_due();
-        // A new cycle begins once every task has reported.
-        if REPORTS.compare_exchange(ALL_TASKS, 0, Ordering::Relaxed, Ordering::Relaxed).is_ok() {
-            watchdog::feed();
-        }
+        tasks::feed_watchdog();
     }
 
     /// Passes the waiting CAN frames and the fibre-optic gyro's bytes to the coprocessor.
@@ -317,44 +263,13 @@ impl Output {
         }
         let unread = &mut self.unread;
         self.outgoing.service(|frame| {
-            if !diagnosis::is_request(frame.id()) {
+            if !is_request(frame.id()) {
                 return false;
             }
             let has_room = FROM_SLCAN.push(frame);
-            idle::attend();
+            tasks::wake_idle();
             count(unread, u32::from(!has_room));
             has_room
         });
     }
-}
-
-/// Announces that the buses will be silent, then runs `work`, which silences them. Idle calls this.
-pub fn with_silence_announced<T>(work: impl FnOnce() -> T) -> T {
-    STATE.store(REQUESTED, Ordering::Relaxed);
-    attend();
-    wait(ANNOUNCE_US, || STATE.load(Ordering::Relaxed) == ANNOUNCED);
-    wait(LEAVE_US, || false);
-    let result = work();
-    STATE.store(RUNNING, Ordering::Relaxed);
-    result
-}
-
-fn is_requested() -> bool {
-    STATE.load(Ordering::Relaxed) != RUNNING
-}
-
-fn announce() {
-    let _ = STATE.compare_exchange(REQUESTED, ANNOUNCED, Ordering::Relaxed, Ordering::Relaxed);
-}
-
-/// Waits, asleep between interrupts, until `over` returns true or `us` microseconds have passed. Idle calls this.
-pub fn wait(us: u64, over: impl Fn() -> bool) {
-    let until = timer::micros() + us;
-    let _ = (0..(us / 1_000 + 1) * WAKES_PER_MS).any(|_| {
-        let over = over() || timer::micros() >= until;
-        if !over {
-            cortex_m::asm::wfi();
-        }
-        over
-    });
 }

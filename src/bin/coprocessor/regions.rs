@@ -1,9 +1,9 @@
 //! The regions of the flash that the image writes: records, weight files, and firmware in the slot that does not run.
 #![allow(unsafe_code, reason = "memory by address; the block says why it is sound")]
 
-use crate::output;
 use crate::stm32f405::flash::{Flash, FlashError, WORD};
 use crate::stm32f405::watchdog;
+use crate::tasks;
 use core::ops::Range;
 use cortex_m::peripheral::SCB;
 use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
@@ -25,7 +25,7 @@ fn erase(flash: &Flash, range: Range<u32>) -> Result<(), FlashError> {
     if running().is_some_and(runs) {
         return Err(FlashError::OutOfBounds);
     }
-    output::with_silence_announced(|| {
+    tasks::with_silence_announced(|| {
         let mut at = range.start;
         while at < range.end {
             let sector = sector(at).filter(|sector| sector.end <= range.end).ok_or(FlashError::NotAligned)?;

@@ -3,8 +3,8 @@
 
 use crate::board::Board;
 use crate::boards::BOARD;
-use crate::diagnosis;
 use crate::idle::Stored;
+use crate::queues;
 use crate::regions::{self, Records, Weights};
 use crate::stm32f405::{clocks::FULL_HZ, flash::Flash, pac};
 use core::mem::MaybeUninit;
@@ -37,7 +37,7 @@ const BUILT_IN: &[u8] = &weights::DEFAULT.0;
 fn receive(board: &Board, device: &Device<Records, Weights>) {
     let configuration = device.configuration();
     // A stored configuration has been checked.
-    configuration.diagnosis.ids().into_iter().for_each(diagnosis::set_ids);
+    configuration.diagnosis.ids().into_iter().for_each(queues::set_ids);
     if let Some(can) = &board.can {
         can.set_bit_rate(configuration.can.bits_per_second);
         can.receive_only(device.received());
