@@ -116,18 +116,8 @@ fn install(environment: &Path, python: &Path) -> Result<(), PythonError> {
     )?;
     let requirements = environment.join("requirements.txt");
     std::fs::write(&requirements, REQUIREMENTS).map_err(&folder)?;
-    let pip = [
-        "-m",
-        "pip",
-        "install",
-        "--quiet",
-        "--disable-pip-version-check",
-        "--no-compile",
-        "--retries",
-        "1",
-        "-r",
-    ];
-    run("pip install", Command::new(python).args(pip).arg(&requirements))?;
+    let pip = "-m pip install --quiet --disable-pip-version-check --no-compile --retries 1 -r";
+    run("pip install", Command::new(python).args(pip.split(' ')).arg(&requirements))?;
     Ok(std::fs::rename(&requirements, environment.join(STAMP)).map_err(&folder)?)
 }
 

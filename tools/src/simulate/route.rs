@@ -20,7 +20,7 @@ pub struct Route {
 impl Route {
     pub fn new(seed: u64) -> Self {
         let mut random = Purpose::Route.stream(seed);
-        let side = if random.between(0.0, 1.0) < 0.5 { 1.0 } else { -1.0 };
+        let side = random.sign();
         Self { random, legs: 0, side, streets: u32::MAX }
     }
 
@@ -60,8 +60,7 @@ impl Iterator for Route {
                 Leg::Road { metres: between(random, 55.0, 75.0), speed: between(random, 4.5, 6.0), turn }
             }
             _ => {
-                let way = if between(random, 0.0, 1.0) < 0.5 { 1.0 } else { -1.0 };
-                let turn = way * between(random, 0.25, 0.7);
+                let turn = random.sign() * between(random, 0.25, 0.7);
                 Leg::Road { metres: between(random, 90.0, 140.0), speed: between(random, 10.0, 14.0), turn }
             }
         })

@@ -122,15 +122,8 @@ pub fn build_banks(package: &Path, folder: &Path) -> Result<PathBuf, BenchError>
 
 pub fn build_for((board, target): (&str, &str), image: &str, folder: &Path) -> Result<PathBuf, BenchError> {
     let mut cargo = Command::new(std::env::var_os("CARGO").as_deref().unwrap_or(OsStr::new("cargo")));
-    cargo.current_dir(workspace()).args([
-        "build",
-        "--release",
-        "--quiet",
-        "-p",
-        "gyronet-images",
-        "--bin",
-        image,
-    ]);
+    let build = "build --release --quiet -p gyronet-images --bin";
+    cargo.current_dir(workspace()).args(build.split(' ')).arg(image);
     // Those to flash as `cargo fw` builds them; no debugger is attached to the others.
     let is_flashed = FLASHED.contains(&image);
     let setting = if is_flashed { "profile.release.opt-level='s'" } else { "profile.release.debug=false" };

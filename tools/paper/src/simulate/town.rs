@@ -56,13 +56,13 @@ impl Town {
         // Drivers deviate from the limit, and from each other.
         let speed = limit * random.between(0.85, 1.05);
         let metres = random.between(BLOCK[0], BLOCK[1]) * limit / slowest;
-        let bent = random.between(0.0, 1.0) < BENDS;
-        let sign = if random.between(0.0, 1.0) < 0.5 { 1.0 } else { -1.0 };
+        let bent = random.chance(BENDS);
+        let sign = random.sign();
         // A bend must be drivable at the street's speed.
         let sharpest = 0.5 * LATERAL * metres / (2.0 * speed * speed);
         let turn = if bent { sign * random.between(0.1, 0.9) * sharpest.min(1.0) } else { 0.0 };
         self.legs.push_back(Leg::Road { metres, speed, turn });
-        if random.between(0.0, 1.0) < STOPS {
+        if random.chance(STOPS) {
             self.legs.push_back(Leg::Stand { seconds: random.between(WAIT[0], WAIT[1]) });
         }
         let pick = random.between(0.0, 1.0);
