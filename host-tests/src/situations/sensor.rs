@@ -5,6 +5,7 @@ use super::ride::Travelled;
 use super::vehicle::{Part, Vehicle};
 use gyronet::sample::{ImuSample, Validity};
 use gyronet::sensor::dsp1760::message::{self as dsp1760, Extra};
+use gyronet::sensor::xsens::MtData2;
 use gyronet::units::{AngularRate, CentiCelsius, Micros, SpecificForce};
 use gyronet_tools::random::Random;
 
@@ -231,7 +232,7 @@ fn increment(number: u64, stamp: u64, turns: [f64; 6], without: Option<usize>) -
     message.emit().to_vec()
 }
 
-/// An MTData2 message in single precision, from the manual of the MTi 600 series (MT Low Level Communication).
+/// A message of an MTi; readings beyond the part's range are clipped and marked, and one may be no number.
 pub fn mti(number: u16, ticks: u32, readings: [f64; 6], celsius: f64, without: Option<usize>) -> Vec<u8> {
     let mut status = MTI_GOOD;
     let mut value = |axis: usize| {
@@ -239,22 +240,15 @@ pub fn mti(number: u16, ticks: u32, readings: [f64; 6], celsius: f64, without: O
         if readings[axis].abs() > range {
             status |= MTI_CLIPPED;
         }
-        let value = if without == Some(axis) { f64::NAN } else { readings[axis].clamp(-range, range) };
-        (value as f32).to_be_bytes()
+        if without == Some(axis) { f32::NAN } else { readings[axis].clamp(-range, range) as f32 }
     };
-    let vectors = [value(3), value(4), value(5), value(0), value(1), value(2)].concat();
-    let (forces, rates) = vectors.split_at(12);
-    let packets: [(u16, &[u8]); 6] = [
-        (0x1020, &number.to_be_bytes()),
-        (0x1060, &ticks.to_be_bytes()),
-        (0x0810, &(celsius as f32).to_be_bytes()),
-        (0x4020, forces),
-        (0x8020, rates),
-        (0xE020, &status.to_be_bytes()),
-    ];
-    let data =
-        packets.map(|(id, bytes)| [&id.to_be_bytes(), &[bytes.len() as u8][..], bytes].concat()).concat();
-    let body = [&[0xFF, 0x36, data.len() as u8][..], &data].concat();
-    let sum = body.iter().fold(0u8, |sum, byte| sum.wrapping_add(*byte));
-    [&[0xFA][..], &body, &[sum.wrapping_neg()]].concat()
+    let message = MtData2 {
+        packet_counter: Some(number),
+        sample_time_fine: Some(ticks),
+        acceleration: Some([3, 4, 5].map(&mut value)),
+        rate_of_turn: Some([0, 1, 2].map(value)),
+        temperature: Some(celsius as f32),
+        status: Some(status),
+    };
+    message.emit().to_vec()
 }
