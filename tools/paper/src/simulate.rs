@@ -115,4 +115,18 @@ pub fn write(spec: &Spec, folder: &Path) -> io::Result<()> {
 }
 
 #[cfg(test)]
-mod tests;
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sets_share_devices_and_no_run() {
+        let all: Vec<Spec> =
+            [Set::Train, Set::Test, Set::Transfer].iter().flat_map(|set| set.specs()).collect();
+        let mut runs: Vec<u64> = all.iter().map(|spec| spec.run).collect();
+        runs.sort_unstable();
+        runs.dedup();
+        assert_eq!((all.len(), runs.len()), (16, 16));
+        assert!(all[..12].iter().all(|spec| spec.device == 1));
+        assert!(all[12..].iter().all(|spec| spec.device == 2));
+    }
+}

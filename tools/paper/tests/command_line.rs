@@ -12,9 +12,13 @@ fn text(bytes: &[u8]) -> String {
 
 #[test]
 fn wrong_arguments_are_status_2_and_failures_1() {
-    for wrong in
-        [&["nonsense"][..], &["tables", "urban14", "--method", "mine"], &["simulate", "--layout", "nclt"]]
-    {
+    for wrong in [
+        &["nonsense"][..],
+        &["tables", "urban14", "--method", "mine"],
+        &["tables", "urban14", "--method", "mine="],
+        &["tables", "urban14", "--method", "=mine"],
+        &["simulate", "--layout", "nclt"],
+    ] {
         let output = paper(wrong);
         assert_eq!(output.status.code(), Some(2), "{wrong:?}: {}", text(&output.stderr));
     }

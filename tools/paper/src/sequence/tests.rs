@@ -47,6 +47,7 @@ fn kaist_is_read_whole() {
     assert!((sequence.seconds() - 60.0).abs() < 0.05, "{}", sequence.seconds());
     assert_eq!(sequence.files.each_ref().map(|file| file.rows), [6_000, 60_000, 6_000, 6_000]);
     assert_eq!(sequence.in_gap, [0; 4]);
+    assert!(sequence.start_s > 1.5e9 && sequence.wheel_base == 1.5285);
     assert_eq!(sequence.simulated.as_ref().map(|spec| spec.run), Some(5));
     assert!(!sequence.has_vendor, "the heading of a simulation is no vendor's");
     // The gyro's turn is the sum of its file.

@@ -7,7 +7,6 @@
 //! runs once with its published defaults, and once with rest thresholds that a standing vehicle with its engine
 //! running stays below.
 
-use super::estimate::{Estimate, Places};
 use super::given::Given;
 use super::joint::Joint;
 use crate::fog_replay;
@@ -27,7 +26,30 @@ use gyronet_tools::drive::replay::{Replay, Step};
 use gyronet_tools::drive::stream::Recording;
 use gyronet_tools::evaluate::fir::LowPass;
 use gyronet_tools::evaluate::methods::Method;
+use gyronet_tools::evaluate::trajectory_error::Point;
 use gyronet_tools::evaluate::vqf;
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Estimate {
+    pub method: Method,
+    /// Angle turned in each step, from the first compared step on, rad.
+    pub turns: Vec<f64>,
+    /// Source of the positions after these turns.
+    pub places: Places,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub enum Places {
+    /// Dead reckoning with the wheels' distances times a scale.
+    Reckoned { scale: f64 },
+    /// A given trajectory: the position after each turn, relative to that of the first step, m.
+    Given(Vec<Point>),
+}
+
+impl Places {
+    /// Dead reckoning with the unscaled distances.
+    pub const RECKONED: Self = Self::Reckoned { scale: 1.0 };
+}
 
 #[derive(Debug, Clone, PartialEq)]
 pub struct Estimates {

@@ -6,7 +6,7 @@
 //! the end. Poses at the sequence's steps are interpolated. A trajectory that cannot be compared is an error and
 //! gives no numbers.
 
-use super::estimate::{Estimate, Places};
+use super::estimates::{Estimate, Places};
 use crate::sequence::Sequence;
 use crate::trajectory::{Pose, Trajectory};
 use gyronet_tools::drive::DT;

@@ -6,7 +6,7 @@
 //! bias). The distance is that of the wheels times a scale. The fit shows how much of a network's gain four numbers
 //! achieve.
 
-use super::estimate::{Estimate, Places};
+use super::estimates::{Estimate, Places};
 use crate::sequence::{Sequence, Step};
 use gyronet_tools::calibrate::NormalEquations;
 use gyronet_tools::drive::DT;

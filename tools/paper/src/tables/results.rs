@@ -1,7 +1,6 @@
 //! Computes the errors of every method on every sequence, and their means, for the tables and the JSON.
 
-use super::estimate::{Estimate, Places};
-use super::estimates::Estimates;
+use super::estimates::{Estimate, Estimates, Places};
 use super::group::Group;
 use crate::sequence::Sequence;
 use gyronet_tools::drive::DT;
