@@ -117,6 +117,7 @@ fn each_defect_is_found() {
             true
         });
     };
+    let degrees = |_: usize, row: &mut [f64; 10]| row[4..7].iter_mut().for_each(|rate| *rate *= DEGREES);
     bad("gaps", "1 with 150 missing rows", &|k, _| !(3_000..3_150).contains(&k));
     changed("gyro range", "samples at the limit of 11.5 deg/s", &|_, row| row[6] = row[6].clamp(-0.2, 0.2));
     changed("stuck samples", "12 samples repeat", &|k, row| {
@@ -137,21 +138,13 @@ fn each_defect_is_found() {
     changed("mounting", "imu is in g; `cargo gyronet import made.csv --unit imu=g --out", &|_, row| {
         row[1..4].iter_mut().for_each(|force| *force /= 9.8)
     });
-    changed(
-        "gyro unit",
-        "imu is in deg/s; `cargo gyronet import made.csv --unit imu=deg/s --out",
-        &|_, row| row[4..7].iter_mut().for_each(|rate| *rate *= DEGREES),
-    );
+    changed("gyro unit", "imu is in deg/s; `cargo gyronet import made.csv --unit imu=deg/s --out", &degrees);
     changed("rate", "t_s is in ms; `cargo gyronet import made.csv --unit t_s=ms --out", &|_, row| {
         row[0] *= 1e3
     });
     changed("wheels", "swapped", &|_, row| row.swap(7, 8));
-    changed(
-        "reference",
-        "imu is in deg/s; `cargo gyronet import made.csv --unit imu=deg/s --out",
-        &|_, row| row[4..7].iter_mut().for_each(|rate| *rate *= DEGREES),
-    );
-    changed("wheels", "imu is in deg/s", &|_, row| row[4..7].iter_mut().for_each(|rate| *rate *= DEGREES));
+    changed("reference", "imu is in deg/s; `cargo gyronet import made.csv --unit imu=deg/s --out", &degrees);
+    changed("wheels", "imu is in deg/s", &degrees);
     changed("reference", "ref_gyr_z is in deg/s", &|_, row| row[9] *= DEGREES);
     changed("reference", "the opposite sign", &|_, row| row[9] = -row[9]);
     changed("reference", "it shows no turn, and the gyro turns by ", &|_, row| row[9] = 0.0);

@@ -1,9 +1,8 @@
 //! Builds the paper's tables with our results, as rows of text and numbers that [`super::text`] prints.
 
-use super::group::Group;
 use super::notes;
 use super::paper::{self, Line};
-use super::results::{ByMethod, Errors, Results, SequenceErrors, mean};
+use super::results::{ByMethod, Errors, Group, Results, SequenceErrors, mean};
 use gyronet_tools::evaluate::methods::{Gyro, Method};
 use std::path::Path;
 
@@ -61,8 +60,7 @@ pub fn tables(results: &Results) -> Vec<Table> {
         (Group::NewlyReleased, "newly released sequences"),
         (Group::OtherDevices, "sequences of other devices"),
     ] {
-        let title = format!("Table V: average ATE on {what}");
-        tables.extend(some(&of(group), |set| average(set, &title, &paper::NEW_SEQUENCES)));
+        tables.extend(some(&of(group), |set| later(set, what)));
     }
     tables
 }
@@ -194,19 +192,10 @@ fn padding(set: &[&SequenceErrors]) -> Table {
         [("no padding", "fognet_nopad"), ("padding", "fognet")].into_iter().filter_map(|(name, key)| {
             Some(Row { name: name.into(), figures: figures(Some(means.get(key)?), &ATE) })
         });
-    Table {
-        title: String::from("Table III: padding, average ATE, m"),
-        simulated: set.iter().any(|sequence| sequence.simulated),
-        columns: names(&["ATE", "aligned"]),
-        decimals: 2,
-        rows: rows.collect(),
-        paper_columns: names(&["ATE", "aligned"]),
-        paper_rows: lines(&paper::PADDING),
-        notes: notes::with_fognet(set, &[]),
-    }
+    averages(set, "Table III: padding, average ATE, m".into(), rows.collect(), &paper::PADDING)
 }
 
-fn average(set: &[&SequenceErrors], title: &str, paper: &[Line]) -> Table {
+fn later(set: &[&SequenceErrors], what: &str) -> Table {
     let means = mean(set.iter().copied());
     let rows = methods_of(set, |_| true).into_iter().map(|method| Row {
         name: match method.gyro {
@@ -215,12 +204,17 @@ fn average(set: &[&SequenceErrors], title: &str, paper: &[Line]) -> Table {
         },
         figures: figures(means.get(method.key), &ATE),
     });
+    let title = format!("Table V: average ATE on {what}, {} sequences, m", set.len());
+    averages(set, title, rows.collect(), &paper::NEW_SEQUENCES)
+}
+
+fn averages(set: &[&SequenceErrors], title: String, rows: Vec<Row>, paper: &[Line]) -> Table {
     Table {
-        title: format!("{title}, {} sequences, m", set.len()),
+        title,
         simulated: set.iter().any(|sequence| sequence.simulated),
         columns: names(&["ATE", "aligned"]),
         decimals: 2,
-        rows: rows.collect(),
+        rows,
         paper_columns: names(&["ATE", "aligned"]),
         paper_rows: lines(paper),
         notes: notes::with_fognet(set, &[]),

@@ -1,6 +1,5 @@
-use super::group::Group;
 use super::joint::Fit;
-use super::results::{Results, SequenceErrors};
+use super::results::{Group, Results, SequenceErrors};
 use super::{estimates, table};
 use crate::sequence::{Sequence, Step, StreamSummary};
 use crate::simulate::{self, Spec};
