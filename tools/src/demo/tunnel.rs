@@ -4,9 +4,8 @@ use crate::drive::error::DataError;
 use crate::drive::stream::Drive;
 use crate::drive::word;
 use crate::evaluate::methods::Method;
-use crate::evaluate::outage;
-use crate::evaluate::outage_chart;
 use crate::evaluate::outage_table::{Figures, Outages};
+use crate::evaluate::{outage, outage_chart};
 use gyronet::model::WindowNetwork;
 use std::fmt;
 
