@@ -285,6 +285,16 @@ impl Pipeline {
         self.zero_rate().map_or(AngularRate::ZERO, ZeroRate::bias)
     }
 
+    /// Returns the expected error of the residual bias when driving, 1 sigma, rad/s; 0 without zero-rate updates.
+    pub fn residual_sigma(&self) -> f32 {
+        self.zero_rate().map_or(0.0, ZeroRate::sigma)
+    }
+
+    /// Returns what standstills and turns have shown of the vertical, in the sensor's axes, if it is estimated.
+    pub fn vertical(&self) -> Option<&Vertical> {
+        self.state.initialised.as_ref()?.level.vertical()
+    }
+
     fn judged(&self, standing: Standing) -> Standing {
         match self.zero_rate() {
             Some(known) if known.contradicted() => Standing { is_contradicted: true, ..Standing::UNKNOWN },

@@ -1,5 +1,6 @@
 //! The results of one drive, for the summary that `gyronet demo` prints and for its page.
 
+mod learnt;
 mod page;
 mod trajectory;
 mod tunnel;
@@ -9,6 +10,7 @@ use crate::evaluate::rates::Rates;
 use crate::evaluate::report::DriveErrors;
 use serde_json::Value;
 
+pub use learnt::Learnt;
 pub use trajectory::{Path, Trajectories};
 pub use tunnel::Tunnel;
 
@@ -21,6 +23,7 @@ pub struct Demo<'a> {
     /// The path of the vehicle by each method, where the drive has wheels.
     pub trajectories: Option<Trajectories>,
     pub tunnel: Option<&'a Tunnel>,
+    pub learnt: &'a Learnt,
     pub frames: u64,
 }
 

@@ -5,7 +5,7 @@ use gyronet::coprocessor::{Config, TimedFrame};
 use gyronet::model::GyroNet;
 use gyronet_tools::board::Board;
 use gyronet_tools::bundled;
-use gyronet_tools::demo::{Demo, Trajectories, Tunnel};
+use gyronet_tools::demo::{Demo, Learnt, Trajectories, Tunnel};
 use gyronet_tools::drive::candump::Log;
 use gyronet_tools::drive::error::{DataError, DataFault};
 use gyronet_tools::drive::replay::Steps;
@@ -24,7 +24,7 @@ use std::path::PathBuf;
 
 /// Show all results of one drive: a table of errors, a page, a CAN log.
 ///
-/// The page (demo.html) needs only a browser. It has charts of yaw, errors and path that can be zoomed, and the table
+/// The page (demo.html) needs only a browser. It has charts of yaw, errors, path and what the board learns of its sensor, that can be zoomed, and the table
 /// of all methods, of which the terminal shows the best classical ones of each column, static initialisation without
 /// and with zero-rate updates, and ours. Without FILE the command takes the simulated drive that comes with it.
 #[derive(Debug, Clone, clap::Args)]
@@ -51,17 +51,20 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     })
 }
 
-type TunnelResult = Result<Option<Tunnel>, Box<dyn Error + Send + Sync>>;
+type TunnelResult = Result<(Option<Tunnel>, Learnt), Box<dyn Error + Send + Sync>>;
 
 /// The table of errors has no courses: a course is an input of ours, and the classical methods have none.
 fn tunnel(args: &Args) -> TunnelResult {
     let weights = args.sent.open()?;
     let mut network = GyroNet::new(weights.blob()?);
-    Ok(match &args.file {
-        Some(path) => Tunnel::new(&Drive::open_moving(path)?, &mut network, EVERY_S)?,
+    let bundled = bundled::demo_drive(true)?;
+    let (drive, every_s) = match &args.file {
+        Some(path) => (Drive::open_moving(path)?, EVERY_S),
         // A first try takes little time.
-        None => Tunnel::new(&Drive::from(&bundled::demo_drive(true)?), &mut network, 5 * EVERY_S)?,
-    })
+        None => (Drive::from(&bundled), 5 * EVERY_S),
+    };
+    let tunnel = Tunnel::new(&drive, &mut network, every_s)?;
+    Ok((tunnel, Learnt::new(&drive, network)?))
 }
 
 fn results(args: &Args, common: Common, tunnel: impl FnOnce() -> TunnelResult) -> super::Result {
@@ -107,9 +110,10 @@ fn results(args: &Args, common: Common, tunnel: impl FnOnce() -> TunnelResult) -
     }
     let frames = log_file.finish()?;
     let simulated = args.file.is_none();
-    let tunnel = tunnel().map_err(|error| -> Box<dyn Error> { error })?;
+    let (tunnel, learnt) = tunnel().map_err(|error| -> Box<dyn Error> { error })?;
     let (errors, tunnel, trajectories) = (errors.as_ref(), tunnel.as_ref(), Trajectories::new(drive, &rates));
-    let demo = Demo { drive, simulated, rates: &rates, errors, trajectories, tunnel, frames };
+    let demo =
+        Demo { drive, simulated, rates: &rates, errors, trajectories, tunnel, learnt: &learnt, frames };
     std::fs::write(&page, demo.page()).map_err(named(&page))?;
 
     let mut out = std::io::stdout().lock();

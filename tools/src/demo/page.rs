@@ -46,6 +46,12 @@ pub fn page(demo: &Demo<'_>) -> String {
         body += "<h2>Path</h2>\n";
         body += &paths(trajectories, demo.drive.vehicle.radius_m());
     }
+    let learnt = demo.learnt.charts();
+    if !learnt.is_empty() {
+        body += &format!(
+            "<h2>What the board learns</h2>\n<p class=\"note\">With every course of the drive; time begins with it.</p>\n{learnt}"
+        );
+    }
     body += "<h2>Methods</h2>\n";
     body += &methods(demo);
     document(&format!("gyronet demo: {name}"), &body)

@@ -46,6 +46,7 @@ fn the_readme_has_the_tables_that_the_demo_prints() {
     let table = text.split("\n\n").find(|part| part.starts_with("  heading error")).expect("a table");
     assert!(readme.contains(table), "{table}");
     assert!(page.contains("<h2>A tunnel</h2>") && page.contains(">the median of 44 "));
+    assert!(page.contains("<h2>What the board learns</h2>") && page.contains("<b>Pitch of the mounting</b>"));
     let tunnels = text.split("\n\n").find(|part| part.starts_with("60 s without")).expect("a table");
     let ours = tunnels.lines().last().expect("a row").split_whitespace();
     let cells: String = ours.map(|cell| format!("<td>{cell}</td>")).collect();
