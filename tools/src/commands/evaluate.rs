@@ -2,6 +2,7 @@
 
 use super::{Common, drives, named, paint, print_json, progress, weights};
 use gyronet::model::GyroNet;
+use gyronet::pipeline::PipelineConfig;
 use gyronet_tools::bundled;
 use gyronet_tools::drive::recording;
 use gyronet_tools::drive::stream::Drive;
@@ -49,11 +50,35 @@ pub struct Args {
     /// With --outage, write pictures of the median and of the worst outage into this folder: median.svg, worst.svg.
     #[arg(long, value_name = "FOLDER", requires = "outage")]
     pictures: Option<PathBuf>,
+    /// With --outage, do without these in gyronet's rows: the gain that courses show, the vertical that standstills and
+    /// turns show. What the bias is worth shows against zero-rate updates, the model against the row without it.
+    #[arg(long, value_name = "PART", value_delimiter = ',', requires = "outage")]
+    without: Vec<Part>,
     /// Add rows for the paper's GyroNet, in f32 and in integers; they take twenty times as long as all others together.
     #[arg(long)]
     gyronet: bool,
     #[command(flatten)]
     unit: weights::Unit,
+}
+
+/// What the board learns, and can be told not to.
+#[derive(Debug, Clone, Copy, clap::ValueEnum)]
+enum Part {
+    Gain,
+    Level,
+}
+
+impl Args {
+    fn pipeline(&self) -> PipelineConfig {
+        let mut pipeline = PipelineConfig::DEFAULT;
+        for part in &self.without {
+            match part {
+                Part::Gain => pipeline.course.gain = 0.0,
+                Part::Level => pipeline.levelling = false,
+            }
+        }
+        pipeline
+    }
 }
 
 pub fn run(args: &Args, common: Common) -> super::Result {
@@ -90,7 +115,8 @@ fn outages(args: &Args, common: Common) -> super::Result {
         let drive = Drive::open_moving(file)?;
         let mut network = GyroNet::new(weights.blob()?);
         let bar = progress::bar(common, drive.facts.rows, drive.name());
-        let found = outage::run(&drive, &mut network, &lengths, outage::EVERY_S, || bar.inc(1));
+        let found =
+            outage::run(&drive, &mut network, &lengths, outage::EVERY_S, args.pipeline(), || bar.inc(1));
         bar.finish_and_clear();
         let (found, driven_s) = found?;
         if found.is_empty() {
@@ -113,7 +139,7 @@ fn outages(args: &Args, common: Common) -> super::Result {
     }
     let drives = sets.iter().flat_map(|(_, drives)| drives);
     if let Some(folder) = &args.pictures {
-        pictures(folder, drives.clone(), &mut GyroNet::new(weights.blob()?))?;
+        pictures(folder, drives.clone(), &mut GyroNet::new(weights.blob()?), args.pipeline())?;
     }
     let mut out = std::io::stdout().lock();
     let each: Vec<Outages> =
@@ -135,6 +161,7 @@ fn pictures<'a>(
     folder: &Path,
     drives: impl Iterator<Item = &'a Found<'a>> + Clone,
     network: &mut GyroNet<'_>,
+    ours: PipelineConfig,
 ) -> super::Result {
     let all = drives.clone().flat_map(|(_, found)| found);
     let chosen = outage_chart::typical(all).ok_or("no outage to draw: too little course or reference")?;
@@ -143,7 +170,7 @@ fn pictures<'a>(
         let is_of = |(_, found): &&Found<'_>| found.iter().any(|own| std::ptr::eq(own, outage));
         let Some((file, _)) = drives.clone().find(is_of) else { continue };
         let drive = Drive::open_moving(file)?;
-        let points = outage::trace(&drive, network, outage)?;
+        let points = outage::trace(&drive, network, outage, ours)?;
         let title = format!("{}, drive {}", recording::set(file), drive.name());
         let file = folder.join(name);
         std::fs::write(&file, outage_chart::svg(&title, &which, outage, &points)).map_err(named(&file))?;

@@ -4,9 +4,11 @@ use crate::drive::error::DataError;
 use crate::drive::stream::Drive;
 use crate::drive::word;
 use crate::evaluate::methods::Method;
+use crate::evaluate::outage;
+use crate::evaluate::outage_chart;
 use crate::evaluate::outage_table::{Figures, Outages};
-use crate::evaluate::{outage, outage_chart};
 use gyronet::model::WindowNetwork;
+use gyronet::pipeline::PipelineConfig;
 use std::fmt;
 
 /// Length of a tunnel, s.
@@ -39,7 +41,8 @@ impl Tunnel {
             return Ok(None);
         }
         let fewer = (drive.facts.seconds() / ALL_S).ceil() as usize;
-        let (found, _) = outage::run(drive, network, &[SECONDS], every_s * fewer, || {})?;
+        let (found, _) =
+            outage::run(drive, network, &[SECONDS], every_s * fewer, PipelineConfig::DEFAULT, || {})?;
         let outages = Outages::new(drive.name(), &[SECONDS], std::iter::once(found.as_slice()));
         let Some([(median, which), _]) =
             outage_chart::typical(found.iter()).filter(|_| !outages.outage[&SECONDS].is_empty())
@@ -48,7 +51,7 @@ impl Tunnel {
         };
         let command = (fewer > 1)
             .then(|| format!("cargo gyronet evaluate {} --outage {SECONDS}", word(drive.path.as_ref())));
-        let points = outage::trace(drive, network, median)?;
+        let points = outage::trace(drive, network, median, PipelineConfig::DEFAULT)?;
         let picture = outage_chart::svg(drive.name(), &which, median, &points);
         Ok(Some(Self { outages, command, picture }))
     }

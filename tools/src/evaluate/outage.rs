@@ -73,15 +73,16 @@ impl WindowNetwork for Shared<'_> {
 }
 
 /// Runs every method through the outages of a drive, which may begin in motion; also returns the time driven with a
-/// course, s.
+/// course, s. `ours` configures the boards with the course.
 pub fn run(
     drive: &Drive<'_>,
     network: &mut dyn WindowNetwork,
     lengths_s: &[usize],
     every_s: usize,
+    ours: PipelineConfig,
     progress: impl FnMut(),
 ) -> Result<(Vec<Outage>, f64), DataError> {
-    let race = Race::run(drive, network, lengths_s, Starts::Every(every_s * SECOND), progress)?;
+    let race = Race::run(drive, network, lengths_s, Starts::Every(every_s * SECOND), ours, progress)?;
     Ok((race.found, race.driven_s))
 }
 
@@ -90,9 +91,10 @@ pub fn trace(
     drive: &Drive<'_>,
     network: &mut dyn WindowNetwork,
     outage: &Outage,
+    ours: PipelineConfig,
 ) -> Result<Vec<Point>, DataError> {
     let start = (outage.start_s / DT).round() as usize;
-    Ok(Race::run(drive, network, &[outage.seconds], Starts::At(start), || {})?.trace)
+    Ok(Race::run(drive, network, &[outage.seconds], Starts::At(start), ours, || {})?.trace)
 }
 
 /// The boards with the course: without the model, and with it.
@@ -193,9 +195,10 @@ impl<'a> Race<'a> {
         network: &'a mut dyn WindowNetwork,
         lengths_s: &[usize],
         starts: Starts,
+        ours: PipelineConfig,
         mut progress: impl FnMut(),
     ) -> Result<Self, DataError> {
-        let mut race = Self::new(drive, Shared(Rc::new(RefCell::new(network))), lengths_s, starts);
+        let mut race = Self::new(drive, Shared(Rc::new(RefCell::new(network))), lengths_s, starts, ours);
         for (at, row) in drive.rows()?.enumerate() {
             race.row(at, &row?);
             progress();
@@ -207,13 +210,19 @@ impl<'a> Race<'a> {
         Ok(race)
     }
 
-    fn new(drive: &Drive<'_>, network: Shared<'a>, lengths_s: &[usize], starts: Starts) -> Self {
-        let config = || silent(PipelineConfig::DEFAULT);
-        let no_model = Board::new(config(), drive.wheels(), Uncorrected).moving(true);
+    fn new(
+        drive: &Drive<'_>,
+        network: Shared<'a>,
+        lengths_s: &[usize],
+        starts: Starts,
+        ours: PipelineConfig,
+    ) -> Self {
+        let no_model = Board::new(silent(ours), drive.wheels(), Uncorrected).moving(true);
+        let model = Board::new(silent(ours), drive.wheels(), network).moving(true);
         Self {
             lengths: lengths_s.to_vec(),
-            boards: Boards { no_model, model: Board::new(config(), drive.wheels(), network).moving(true) },
-            zero_rate: Board::new(config(), drive.wheels(), Uncorrected).moving(false),
+            boards: Boards { no_model, model },
+            zero_rate: Board::new(silent(PipelineConfig::DEFAULT), drive.wheels(), Uncorrected).moving(false),
             ekf: ekf::Filter::default(),
             vqf: vqf::Heading::new(vqf::on_a_vehicle()),
             speeds: drive.speeds(),

@@ -6,6 +6,7 @@
 //! the end. Poses at the sequence's steps are interpolated. A trajectory that cannot be compared is an error and
 //! gives no numbers.
 
+use super::estimates::{Estimate, Places};
 use crate::sequence::Sequence;
 use crate::trajectory::{Pose, Trajectory};
 use gyronet_tools::drive::DT;
@@ -44,10 +45,10 @@ impl FromStr for Given {
 }
 
 impl Given {
-    /// Returns the turn of each compared step, and the position after it.
-    pub fn path(&self, sequence: &Sequence, start: usize) -> Result<(Vec<f64>, Vec<Point>), DataError> {
+    pub fn estimate(&self, sequence: &Sequence, start: usize) -> Result<Estimate, DataError> {
         let trajectory = Trajectory::read(&self.folder.join(format!("{}.txt", sequence.name)))?;
-        compared(&trajectory, sequence, start)
+        let (turns, places) = compared(&trajectory, sequence, start)?;
+        Ok(Estimate { method: self.method, turns, places: Places::Given(places) })
     }
 }
 
