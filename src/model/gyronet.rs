@@ -5,8 +5,7 @@
 
 use super::blob::{Blob, BlobError, HIDDEN};
 use super::input::load_step;
-use super::weights;
-use super::{Estimate, WindowNetwork};
+use super::{Estimate, WindowNetwork, weights};
 use crate::model::window::{FEATURES, Features, WINDOW};
 use crate::nn::bilstm::{Direction, Run};
 use crate::nn::lstm::{DirectionWeights, Scratch};

@@ -2,8 +2,6 @@
 
 use can_dbc::{AttributeValue, ByteOrder, Dbc, Message, MessageId, NumericValue, Signal, ValueType};
 use embedded_can::{Frame, Id};
-use gyronet::can::DataFrame;
-use gyronet::can::bosch;
 use gyronet::can::config::{Config, Settings, StatusSettings, YawSettings};
 use gyronet::can::diagnosis::DiagnosisIds;
 use gyronet::can::encoder::CanEncoder;
@@ -11,6 +9,7 @@ use gyronet::can::fd::{FD_ID, LENGTH};
 use gyronet::can::load::Periodic;
 use gyronet::can::status::{Evidence, Knowledge, STATUS_ID, SlowStatus, StatusEncoder, Verdict};
 use gyronet::can::yaw::{AngleMessage, DetailMessage, FOG_IDS, Faults, Quality, RateMessage, Source};
+use gyronet::can::{DataFrame, bosch};
 use gyronet::estimate::{VehicleSample, YawEstimate};
 use gyronet::units::{AngularRate, CentiCelsius, SpecificForce, Yaw};
 use gyronet_host_tests::noise::Noise;

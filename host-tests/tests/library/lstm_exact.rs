@@ -3,8 +3,7 @@
 
 use gyronet::nn::activation::{INPUT_BITS, saturate, sigmoid, tanh};
 use gyronet::nn::bilstm::{Direction, Layer, Run, word_index};
-use gyronet::nn::lstm::{DirectionWeights, ROW_LIMIT, Scratch, row_bound};
-use gyronet::nn::lstm::{project, step};
+use gyronet::nn::lstm::{DirectionWeights, ROW_LIMIT, Scratch, project, row_bound, step};
 use gyronet::nn::{GATE_FRACTION_BITS, GATES, HIDDEN_MAX};
 use gyronet_host_tests::noise::{Noise, cases};
 use gyronet_host_tests::packing::{Row, Rows, word};

@@ -1,9 +1,8 @@
 //! A layout describes the positions of wheel speeds in a frame, what the frame says of them, and its protection.
 
-use crate::can::bosch;
 use crate::can::e2e::{Fault, Profile};
-use crate::can::identifier;
 use crate::can::signal::BitField;
+use crate::can::{bosch, identifier};
 use crate::units::{Micros, WheelSpeed};
 use embedded_can::Id;
 

@@ -1,9 +1,8 @@
 //! The errors and costs of each method on each drive, as a table and as JSON.
 
-use crate::drive::DT;
 use crate::drive::error::{DataError, DataFault};
-use crate::drive::recording;
 use crate::drive::stream::Drive;
+use crate::drive::{DT, recording};
 use crate::evaluate::expected_error::ExpectedError;
 use crate::evaluate::heading_error::{AgainstCourse, AgainstRate, Errors, HeadingError, PLAUSIBLE_10S_RAD};
 use crate::evaluate::methods::{Method, PerMethod};
