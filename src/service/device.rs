@@ -7,7 +7,7 @@ mod start;
 mod stored;
 mod weights;
 
-pub use firmware::{Firmware, FirmwareState};
+pub use super::message::{Firmware, FirmwareState};
 pub use weights::MappedSlots;
 
 use super::conditions::Conditions;

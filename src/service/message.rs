@@ -1,13 +1,12 @@
 //! Refusals of requests, and reports of the board's state.
 
-use super::device::Firmware;
 use super::event::{CanFault, ClockFault, Crash, ResetCause, SensorFault};
 use crate::coprocessor::{Contradiction, Coprocessor};
 use crate::fog::FogCounters;
 use crate::health::{Counters, InputCounters, MonitorCounters, Status};
 use crate::store::firmware::FirmwareError;
 use crate::store::slots::{SlotError, WeightSource};
-use crate::store::{Calibration, Configuration, Record, StoreError};
+use crate::store::{Calibration, Configuration, Record, Slot, StoreError};
 use serde::{Deserialize, Serialize};
 
 /// Version of the encoding of these types; every change of a type increments it.
@@ -122,6 +121,42 @@ pub enum FlashState {
     Damaged,
     /// The flash cannot be read.
     Failed(StoreError),
+}
+
+/// How the running firmware stands to its last update.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[repr(u8)]
+pub enum FirmwareState {
+    /// It was not started by the boot loader, and cannot be updated over diagnosis.
+    Alone = 0,
+    /// It is confirmed.
+    Confirmed = 1,
+    /// It is on trial.
+    OnTrial = 2,
+    /// The update after it did not reach on trial what this one had, and was rolled back.
+    RolledBack = 3,
+    /// The newer image is damaged, so this one runs.
+    NewerDamaged = 4,
+}
+
+/// The running firmware.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Firmware {
+    /// Slot of the image that runs.
+    pub slot: Option<Slot>,
+    /// CRC-32 of that image, which tells builds of one version apart.
+    pub crc: Option<u32>,
+    /// How it stands to its last update.
+    pub state: FirmwareState,
+}
+
+impl Firmware {
+    pub(super) const ALONE: Self = Self { slot: None, crc: None, state: FirmwareState::Alone };
+
+    /// Returns whether the newest update does not run.
+    pub const fn is_refused(&self) -> bool {
+        matches!(self.state, FirmwareState::RolledBack | FirmwareState::NewerDamaged)
+    }
 }
 
 /// The board's identity and state.

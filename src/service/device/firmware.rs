@@ -8,12 +8,11 @@
 use super::weights::{Checked, Uploading};
 use super::{Device, INTERRUPTS, MappedSlots};
 use crate::model::blob::CRC;
-use crate::service::message::Refusal;
+use crate::service::message::{Firmware, FirmwareState, Refusal};
 use crate::store::firmware::{self, FirmwareError, Label, MAX_IMAGE, Trailer};
 use crate::store::slots::SlotError;
 use crate::store::{FlashFault, Slot, Upload};
 use embedded_storage::nor_flash::{NorFlash, NorFlashError as _};
-use serde::{Deserialize, Serialize};
 
 /// Time in which an image counts what it reaches, the least time on trial, and the longest, ms.
 const COUNTED_MS: u32 = 30_000;
@@ -24,36 +23,7 @@ const SENSOR: u32 = 1;
 const CAN: u32 = 1 << 1;
 const WINDOW: u32 = 1 << 2;
 
-/// How the running firmware stands to its last update.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[repr(u8)]
-pub enum FirmwareState {
-    /// It was not started by the boot loader, and cannot be updated over diagnosis.
-    Alone = 0,
-    /// It is confirmed.
-    Confirmed = 1,
-    /// It is on trial.
-    OnTrial = 2,
-    /// The update after it did not reach on trial what this one had, and was rolled back.
-    RolledBack = 3,
-    /// The newer image is damaged, so this one runs.
-    NewerDamaged = 4,
-}
-
-/// The running firmware.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Firmware {
-    /// Slot of the image that runs.
-    pub slot: Option<Slot>,
-    /// CRC-32 of that image, which tells builds of one version apart.
-    pub crc: Option<u32>,
-    /// How it stands to its last update.
-    pub state: FirmwareState,
-}
-
 impl Firmware {
-    pub(in crate::service) const ALONE: Self = Self { slot: None, crc: None, state: FirmwareState::Alone };
-
     pub(super) fn of<W: MappedSlots>(flash: &mut W) -> Self {
         let Some(slot) = flash.running() else { return Self::ALONE };
         let Some(own) = Trailer::read(flash, slot) else { return Self::ALONE };
@@ -65,11 +35,6 @@ impl Firmware {
             None => FirmwareState::Confirmed,
         };
         Self { slot: Some(slot), crc: Some(own.crc), state }
-    }
-
-    /// Returns whether the newest update does not run.
-    pub const fn is_refused(&self) -> bool {
-        matches!(self.state, FirmwareState::RolledBack | FirmwareState::NewerDamaged)
     }
 }
 
