@@ -24,6 +24,7 @@ mod data;
 mod download;
 #[doc(hidden)]
 pub mod dtc;
+mod exchange;
 #[doc(hidden)]
 pub mod isotp;
 mod response;

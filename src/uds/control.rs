@@ -1,8 +1,7 @@
 //! These services control the server and the board: session, reset, communication, and the trouble memory.
 
+use super::exchange::{Exchange, Seed};
 use super::response::{Nrc, exactly, nrc, put};
-use super::security::Seed;
-use super::services::Exchange;
 use super::session::Session;
 use crate::service::MappedSlots;
 use automotive_diag::uds::ResetType;

@@ -1,9 +1,8 @@
 //! The values behind the data identifiers (ISO 14229-1 C.1), big-endian. `gyronet reference identifiers` prints them.
 
+use super::exchange::{Exchange, Seed};
 use super::isotp::TransportErrors;
 use super::response::{Nrc, Response, decode, nrc, put, put_record};
-use super::security::Seed;
-use super::services::{Exchange, UPDATE};
 use crate::coprocessor::Contradiction;
 use crate::fog::FogCounters;
 use crate::heading::CourseCounters;
@@ -15,6 +14,8 @@ use crate::store::slots::WeightSource;
 use crate::store::{Calibration, Configuration, Record, Slot};
 use embedded_storage::nor_flash::NorFlash;
 
+/// Data identifier of the firmware: its state, and the head of an update.
+pub(super) const UPDATE: u16 = 0x011A;
 /// Identifiers of single settings, which were retired for the configuration (0100).
 const RETIRED_FIRST: u16 = 0x0201;
 const RETIRED_LAST: u16 = 0x021E;
@@ -138,7 +139,7 @@ impl<R: NorFlash, W: MappedSlots, E: FnMut() -> Option<Seed>> Exchange<'_, R, W,
                     .into_iter()
                     .try_for_each(|code: Option<i16>| put(out, &code.unwrap_or(i16::MAX).to_be_bytes()))
             }
-            0x011A => {
+            UPDATE => {
                 let Firmware { slot, crc, state } = device.info().firmware;
                 put(out, &[slot.map_or(0xFF, |slot| slot as u8), state as u8])?;
                 put(out, &crc.unwrap_or(0).to_be_bytes())

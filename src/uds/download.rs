@@ -2,13 +2,12 @@
 //! the head of its update says ([`super::update`]), to address 2, the slot that does not run. Either is used from the
 //! next start on, and only after routine FF01; until then the old one stays.
 
+use super::exchange::{Download, Exchange, Seed};
 use super::response::{Nrc, nrc, put};
-use super::security::Seed;
-use super::services::Exchange;
-use super::signature::{self, Digest};
+use super::signature;
 use crate::service::MappedSlots;
 use crate::service::message::{BLOCK, Refusal};
-use crate::store::firmware::{FirmwareError, Label};
+use crate::store::firmware::FirmwareError;
 use crate::store::slots::SlotError;
 use embedded_storage::nor_flash::NorFlash;
 
@@ -16,15 +15,6 @@ const WEIGHTS: u32 = 0;
 /// Address that took FoGNet's file, which this board no longer runs.
 const FOGNET: u32 = 1;
 const FIRMWARE: u32 = 2;
-
-#[derive(Debug)]
-pub(super) struct Download {
-    /// Label, length and hash of the image, if this is firmware.
-    image: Option<(Label, Digest)>,
-    /// Number of the next block; it starts at 1 and wraps from 255 to 0.
-    next: u8,
-    digest: Option<Digest>,
-}
 
 impl<R: NorFlash, W: MappedSlots, E: FnMut() -> Option<Seed>> Exchange<'_, R, W, E> {
     /// Begins a download with the parameters of 0x34: no compression, the address, the length of the file.
@@ -103,12 +93,5 @@ impl<R: NorFlash, W: MappedSlots, E: FnMut() -> Option<Seed>> Exchange<'_, R, W,
         put(self.out, &crc.to_be_bytes())?;
         download.digest = Some(digest);
         Ok(())
-    }
-}
-
-impl Download {
-    /// Returns the digest of the file, once the file has been checked, and whether it is firmware.
-    pub fn checked(&self) -> Option<(Digest, bool)> {
-        Some((self.digest?, self.image.is_some()))
     }
 }

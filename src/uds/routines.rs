@@ -1,9 +1,7 @@
 //! Runs the routines (service 0x31): a self-test, to forget what was learnt, and the activation of a download.
 
-use super::download::Download;
+use super::exchange::{Download, Exchange, Seed};
 use super::response::{Nrc, exactly, nrc, put};
-use super::security::Seed;
-use super::services::Exchange;
 use super::session::Session;
 use crate::service::MappedSlots;
 use crate::service::message::Refusal;

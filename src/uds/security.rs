@@ -7,42 +7,19 @@
 //! one and doubles each time; it also runs after a restart. Signed data are not delayed, and end the delay: answers of
 //! others do not keep the owner out. Refusals are counted (data 0113) and reported as a trouble; `src/can/README.md` has the codes.
 
+use super::exchange::{Exchange, Seed};
 use super::response::{Nrc, exactly, nrc, put};
-use super::services::Exchange;
 use super::signature::{self, Digest, SEED, SERIAL, SIGNATURE, Statement, TRAILER};
 use crate::service::MappedSlots;
 use crate::service::message::Refusal;
 use crate::store::Access;
 use embedded_storage::nor_flash::NorFlash;
 
-pub type Seed = [u8; SEED];
-
 /// Number of successive wrong answers that cause no delay.
 const FREE_ATTEMPTS: u8 = 2;
 /// First delay, ms; each further wrong answer doubles it, at most to 2^6 times its length.
 const DELAY_MS: u32 = 10_000;
 const MAX_DOUBLINGS: u8 = 6;
-
-#[derive(Debug)]
-pub(super) struct Security {
-    is_unlocked: bool,
-    seed: Option<Seed>,
-    /// Newest challenge; a repeated challenge shows that the random numbers have failed.
-    newest: Seed,
-    /// Time of the last wrong answer, or of the start, ms.
-    wrong_at: u32,
-}
-
-impl Security {
-    pub const fn new() -> Self {
-        Self { is_unlocked: false, seed: None, newest: [0; SEED], wrong_at: 0 }
-    }
-
-    pub fn end(&mut self) {
-        self.is_unlocked = false;
-        self.seed = None;
-    }
-}
 
 impl<R: NorFlash, W: MappedSlots, E: FnMut() -> Option<Seed>> Exchange<'_, R, W, E> {
     /// Refuses a request if the board has a key and this session is not unlocked.

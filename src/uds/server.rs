@@ -4,10 +4,10 @@
 //! than a tester waits. Troubles that must be stored with an erase wait for such a request. The faults that the erase
 //! causes on the board itself are no troubles.
 
+use super::exchange::{Exchange, Seed, Services};
 use super::isotp::{Bytes, Transport};
 use super::response::Nrc;
-use super::security::Seed;
-use super::services::{Exchange, NEGATIVE, Services};
+use super::services::NEGATIVE;
 use crate::service::message::AllCounters;
 use crate::service::{Device, MappedSlots};
 use automotive_diag::uds::UdsCommand;
