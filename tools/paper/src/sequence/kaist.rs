@@ -6,7 +6,8 @@
 //! Sources: the readers irapkaist/file_player and tsyxyz/kaist2bag, and the data set's page.
 
 use super::Files;
-use super::rows::{Format, Rows, seconds};
+use super::rows::{Format, Rows};
+use super::summary::seconds;
 use super::track::{Track, Unwrap};
 use gyronet_tools::drive::error::DataError;
 use std::f64::consts::PI;

@@ -1,6 +1,6 @@
 //! Reads rows of numbers from a file without a header, one row at a time. A row is a stamp and fields.
 
-use super::summary::StreamSummary;
+use super::summary::{StreamSummary, seconds};
 use csv::ByteRecord;
 use gyronet_tools::drive::error::{DataError, DataFault, ValueError};
 use std::fs::File;
@@ -13,11 +13,6 @@ const MAX_VALUE: f64 = 1e12;
 const MAX_SILENCE: f64 = 600.0;
 /// Most columns of a file that are used.
 const MOST: usize = 10;
-
-/// Returns a time in s; stamps are nanoseconds since 1970.
-pub(super) fn seconds(stamps: i64) -> f64 {
-    stamps as f64 / 1e9
-}
 
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Format {

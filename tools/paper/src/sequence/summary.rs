@@ -1,6 +1,5 @@
 //! Summarises a sequence's files and counts the skipped rows.
 
-use super::rows::seconds;
 use serde::Serialize;
 use std::fmt;
 use std::path::Path;
@@ -9,6 +8,11 @@ use std::path::Path;
 const GAP_PERIODS: f64 = 2.5;
 /// A file that ends earlier than this is remarked, s.
 pub(super) const EARLY_S: f64 = 1.0;
+
+/// Returns a time in s; stamps are nanoseconds since 1970.
+pub(super) fn seconds(stamps: i64) -> f64 {
+    stamps as f64 / 1e9
+}
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct Seen {

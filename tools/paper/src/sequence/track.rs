@@ -4,8 +4,8 @@
 //! Increments (angle of a gyro, distance of a wheel) are streams of their sums, so that nothing is lost or counted
 //! twice, whatever the stamps are.
 
-use super::rows::{Row, Rows, seconds};
-use super::summary::StreamSummary;
+use super::rows::{Row, Rows};
+use super::summary::{StreamSummary, seconds};
 use gyronet_tools::drive::error::{DataError, DataFault};
 
 /// Converts a row's fields, at a time in s, to the interpolated values; the function may keep state between rows.
