@@ -170,7 +170,8 @@ impl Estimates {
     }
 
     pub fn add_joint(&mut self, sequence: &Sequence, joint: &Joint) {
-        self.methods.push(joint.estimate(sequence, self.start));
+        let (turns, places) = (joint.turns(sequence, self.start), Places::Reckoned { scale: joint.way });
+        self.methods.push(Estimate { method: Method::FOG_WHEELS, turns, places });
         self.fitted = Some(joint.to_string());
     }
 
@@ -178,9 +179,11 @@ impl Estimates {
     pub fn add_given(&mut self, sequence: &Sequence, given: &Given) {
         let name = given.method.name;
         let is_taken = self.methods.iter().any(|own| own.method.key == name || own.method.name == name);
-        match given.estimate(sequence, self.start) {
+        match given.path(sequence, self.start) {
             _ if is_taken => self.left_out.push((given.method, "it has the name of another method".into())),
-            Ok(estimate) => self.methods.push(estimate),
+            Ok((turns, places)) => {
+                self.methods.push(Estimate { method: given.method, turns, places: Places::Given(places) });
+            }
             Err(error) => self.left_out.push((given.method, error.to_string())),
         }
     }

@@ -6,7 +6,6 @@
 //! the end. Poses at the sequence's steps are interpolated. A trajectory that cannot be compared is an error and
 //! gives no numbers.
 
-use super::estimates::{Estimate, Places};
 use crate::sequence::Sequence;
 use crate::trajectory::{Pose, Trajectory};
 use gyronet_tools::drive::DT;
@@ -45,10 +44,10 @@ impl FromStr for Given {
 }
 
 impl Given {
-    pub fn estimate(&self, sequence: &Sequence, start: usize) -> Result<Estimate, DataError> {
+    /// Returns the turn of each compared step, and the position after it.
+    pub fn path(&self, sequence: &Sequence, start: usize) -> Result<(Vec<f64>, Vec<Point>), DataError> {
         let trajectory = Trajectory::read(&self.folder.join(format!("{}.txt", sequence.name)))?;
-        let (turns, places) = compared(&trajectory, sequence, start)?;
-        Ok(Estimate { method: self.method, turns, places: Places::Given(places) })
+        compared(&trajectory, sequence, start)
     }
 }
 

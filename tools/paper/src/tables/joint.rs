@@ -6,11 +6,9 @@
 //! bias). The distance is that of the wheels times a scale. The fit shows how much of a network's gain four numbers
 //! achieve.
 
-use super::estimates::{Estimate, Places};
 use crate::sequence::{Sequence, Step};
 use gyronet_tools::calibrate::NormalEquations;
 use gyronet_tools::drive::DT;
-use gyronet_tools::evaluate::methods::Method;
 use std::fmt;
 
 /// Number of steps in a span of the fit: 10 s, in which the accumulated errors exceed an encoder's resolution.
@@ -63,14 +61,12 @@ pub struct Joint {
 }
 
 impl Joint {
-    pub fn estimate(&self, sequence: &Sequence, start: usize) -> Estimate {
+    pub fn turns(&self, sequence: &Sequence, start: usize) -> Vec<f64> {
         let turn = |step| {
             let [gyro, difference, constant] = inputs(step);
             self.gyro * gyro + self.difference * difference + self.constant * constant
         };
-        let turns = sequence.steps[start..].iter().map(turn).collect();
-        let places = Places::Reckoned { scale: self.way };
-        Estimate { method: Method::FOG_WHEELS, turns, places }
+        sequence.steps[start..].iter().map(turn).collect()
     }
 }
 
