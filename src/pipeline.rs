@@ -285,12 +285,12 @@ impl Pipeline {
         self.zero_rate().map_or(AngularRate::ZERO, ZeroRate::bias)
     }
 
-    /// Returns the expected error of the residual bias when driving, 1 sigma, rad/s; 0 without zero-rate updates.
-    pub fn residual_sigma(&self) -> f32 {
-        self.zero_rate().map_or(0.0, ZeroRate::sigma)
+    /// Returns the residual bias when driving and its sigma, rad/s; 0 without zero-rate updates.
+    pub fn bias_when_driving(&self) -> [f32; 2] {
+        self.zero_rate().map_or([0.0; 2], ZeroRate::when_driving)
     }
 
-    /// Returns what standstills and turns have shown of the vertical, in the sensor's axes, if it is estimated.
+    /// Returns what standstills and turns have shown of the vertical beyond the configured mounting, if it is estimated.
     pub fn vertical(&self) -> Option<&Vertical> {
         self.state.initialised.as_ref()?.level.vertical()
     }

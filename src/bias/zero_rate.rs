@@ -298,6 +298,11 @@ impl ZeroRate {
         AngularRate(libm::roundf(bias * AngularRate::PER_RAD_PER_SEC) as i32)
     }
 
+    /// Returns the bias when driving, without the offset of a standstill, and its uncertainty, 1 sigma, rad/s.
+    pub fn when_driving(&self) -> [f32; 2] {
+        [self.filter.get::<BIAS>(), self.sigma()]
+    }
+
     /// Returns the uncertainty of the bias when driving, 1 sigma, rad/s; with it the contradiction that is not decided.
     pub fn sigma(&self) -> f32 {
         let off = self.doubt.off(self.filter.get::<BIAS>());

@@ -121,7 +121,7 @@ impl Pipeline {
 
     /// Returns the sigma of what adds linearly, rad/s: bias, `shift` since a jump, revisions that are carried.
     fn bias_sigma(&self, early: Option<f32>, shift: f32) -> f32 {
-        let sigma = early.unwrap_or_else(|| self.residual_sigma());
+        let sigma = early.unwrap_or_else(|| self.zero_rate().map_or(0.0, ZeroRate::sigma));
         let carried = self.state.compensator.carried_in_a_second();
         sqrt(sigma * sigma + shift * shift + carried * carried)
     }

@@ -72,6 +72,8 @@ fn a_synthetic_frame_is_read() {
         status: Some(3),
     };
     assert_eq!(made.emit()[..], synthetic_frame());
+    let warm = MtData2 { temperature: Some(25.0), ..MtData2::default() };
+    assert_eq!(warm.emit()[4..11], [0x08, 0x10, 4, 0x41, 0xC8, 0, 0]);
 }
 
 #[test]

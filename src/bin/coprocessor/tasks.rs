@@ -62,9 +62,11 @@ pub fn feed_watchdog() {
     }
 }
 
-/// The output task sends rates; idle waits for the announcement; a message set without a rate has been queued.
+/// The output task sends rates.
 const RUNNING: u8 = 0;
+/// Idle waits for the announcement.
 const REQUESTED: u8 = 1;
+/// A message set without a rate has been queued.
 const ANNOUNCED: u8 = 2;
 /// Limits how long idle waits for the output task's announcement, us.
 const ANNOUNCE_US: u64 = 20_000;

@@ -24,7 +24,8 @@ use std::path::PathBuf;
 
 /// Show all results of one drive: a table of errors, a page, a CAN log.
 ///
-/// The page (demo.html) needs only a browser. It has charts of yaw, errors, path and what the board learns of its sensor, that can be zoomed, and the table
+/// The page (demo.html) needs only a browser. It has charts of yaw, errors and path, and of the bias, gain and tilt that the
+/// board learns, which can be zoomed, and the table
 /// of all methods, of which the terminal shows the best classical ones of each column, static initialisation without
 /// and with zero-rate updates, and ours. Without FILE the command takes the simulated drive that comes with it.
 #[derive(Debug, Clone, clap::Args)]
@@ -44,30 +45,31 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, common: Common) -> super::Result {
-    // The tunnels take as long as everything else.
+    // What the courses show takes as long as everything else.
     std::thread::scope(|scope| {
-        let tunnel = scope.spawn(|| tunnel(args));
-        results(args, common, || tunnel.join().unwrap_or_else(|panic| resume_unwind(panic)))
+        let with_courses = scope.spawn(|| with_courses(args));
+        results(args, common, || with_courses.join().unwrap_or_else(|panic| resume_unwind(panic)))
     })
 }
 
-type TunnelResult = Result<(Option<Tunnel>, Learnt), Box<dyn Error + Send + Sync>>;
+type WithCourses = Result<(Option<Tunnel>, Learnt), Box<dyn Error + Send + Sync>>;
 
 /// The table of errors has no courses: a course is an input of ours, and the classical methods have none.
-fn tunnel(args: &Args) -> TunnelResult {
+fn with_courses(args: &Args) -> WithCourses {
     let weights = args.sent.open()?;
     let mut network = GyroNet::new(weights.blob()?);
-    let bundled = bundled::demo_drive(true)?;
-    let (drive, every_s) = match &args.file {
-        Some(path) => (Drive::open_moving(path)?, EVERY_S),
-        // A first try takes little time.
-        None => (Drive::from(&bundled), 5 * EVERY_S),
+    let mut run = |drive: Drive<'_>, every_s| -> WithCourses {
+        let tunnel = Tunnel::new(&drive, &mut network, every_s)?;
+        Ok((tunnel, Learnt::new(&drive, network.clone())?))
     };
-    let tunnel = Tunnel::new(&drive, &mut network, every_s)?;
-    Ok((tunnel, Learnt::new(&drive, network)?))
+    match &args.file {
+        Some(path) => run(Drive::open_moving(path)?, EVERY_S),
+        // A first try takes little time.
+        None => run(Drive::from(&bundled::demo_drive(true)?), 5 * EVERY_S),
+    }
 }
 
-fn results(args: &Args, common: Common, tunnel: impl FnOnce() -> TunnelResult) -> super::Result {
+fn results(args: &Args, common: Common, with_courses: impl FnOnce() -> WithCourses) -> super::Result {
     let weights = args.sent.open()?;
     let bundled = bundled::demo_drive(false)?;
     let drive = match &args.file {
@@ -110,7 +112,7 @@ fn results(args: &Args, common: Common, tunnel: impl FnOnce() -> TunnelResult) -
     }
     let frames = log_file.finish()?;
     let simulated = args.file.is_none();
-    let (tunnel, learnt) = tunnel().map_err(|error| -> Box<dyn Error> { error })?;
+    let (tunnel, learnt) = with_courses().map_err(|error| -> Box<dyn Error> { error })?;
     let (errors, tunnel, trajectories) = (errors.as_ref(), tunnel.as_ref(), Trajectories::new(drive, &rates));
     let demo =
         Demo { drive, simulated, rates: &rates, errors, trajectories, tunnel, learnt: &learnt, frames };

@@ -51,7 +51,8 @@ pub struct Args {
     #[arg(long, value_name = "FOLDER", requires = "outage")]
     pictures: Option<PathBuf>,
     /// With --outage, do without these in gyronet's rows: the gain that courses show, the vertical that standstills and
-    /// turns show. What the bias is worth shows against zero-rate updates, the model against the row without it.
+    /// turns show. What the bias by courses is worth shows against zero-rate updates after a rest, what the model is worth
+    /// against the row without it.
     #[arg(long, value_name = "PART", value_delimiter = ',', requires = "outage")]
     without: Vec<Part>,
     /// Add rows for the paper's GyroNet, in f32 and in integers; they take twenty times as long as all others together.
@@ -142,9 +143,13 @@ fn outages(args: &Args, common: Common) -> super::Result {
         pictures(folder, drives.clone(), &mut GyroNet::new(weights.blob()?), args.pipeline())?;
     }
     let mut out = std::io::stdout().lock();
-    let each: Vec<Outages> =
-        sets.iter().map(|(set, drives)| Outages::new(set, &lengths, drives.iter().map(starts_of))).collect();
-    let all = Outages::new("all", &lengths, drives.map(starts_of));
+    let without: String =
+        args.without.iter().map(|part| format!(", without {part:?}").to_lowercase()).collect();
+    let table = |(set, drives): &(String, Vec<Found<'_>>)| {
+        Outages::new(&format!("{set}{without}"), &lengths, drives.iter().map(starts_of))
+    };
+    let each: Vec<Outages> = sets.iter().map(table).collect();
+    let all = Outages::new(&format!("all{without}"), &lengths, drives.map(starts_of));
     if common.json {
         let Outages { outage, outage_after_20_s, .. } = all;
         let json =

@@ -16,7 +16,7 @@ const CHARTS: [(&str, &str); 4] = [
     ("Pitch of the mounting", "deg, beyond the configured one"),
 ];
 
-/// One row a second: the time, s, and value and sigma for each chart, where they are known.
+/// One row a second: the time since the start of the drive, s, and value and sigma for each chart, where they are known.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Learnt(Vec<(f64, [Option<[f64; 2]>; CHARTS.len()])>);
 
@@ -30,16 +30,18 @@ impl Learnt {
             // A start that is refused in motion is no error here.
             let _ = board.row(&row);
             if at % RATE_HZ as usize == 0 {
-                rows.push((row.sample.time.0 as f64 * 1e-6, known(board.coprocessor().pipeline())));
+                let time = (row.sample.time.0 - drive.facts.first.0) as f64 * 1e-6;
+                rows.push((time, known(board.coprocessor().pipeline())));
             }
         }
         Ok(Self(rows))
     }
 
-    /// Returns a chart of each quantity that was known at some time, as HTML.
-    pub fn charts(&self) -> String {
+    /// Returns a chart of each quantity that was known at some time, as HTML, over a range of time, s, in which the drive
+    /// begins at `start`.
+    pub fn charts(&self, range: (f64, f64), start: f64) -> String {
         let charts = CHARTS.into_iter().enumerate().map(|(k, (title, axes))| {
-            let known = || self.0.iter().filter_map(|(time, known)| Some((*time, known[k]?)));
+            let known = || self.0.iter().filter_map(|(time, known)| Some((start + time, known[k]?)));
             let curve = |class, label: &str, sigmas: f64| Curve {
                 class,
                 label: label.into(),
@@ -53,7 +55,7 @@ impl Learnt {
                 curve("less", "-1 sigma", -1.0),
                 curve("default", title, 0.0),
             ];
-            let chart = Chart { title, axes, same_scale: false, curves };
+            let chart = Chart { title, axes, time: Some(range), curves };
             known().next().map_or_else(String::new, |_| chart.html())
         });
         charts.collect()
@@ -62,8 +64,8 @@ impl Learnt {
 
 fn known(pipeline: &Pipeline) -> [Option<[f64; 2]>; CHARTS.len()] {
     let bias = pipeline.gyro_bias().map(|[.., z]| {
-        let bias = z.rad_per_sec() + pipeline.bias().rad_per_sec();
-        [bias, f64::from(pipeline.residual_sigma())].map(f64::to_degrees)
+        let [residual, sigma] = pipeline.bias_when_driving().map(f64::from);
+        [z.rad_per_sec() + residual, sigma].map(f64::to_degrees)
     });
     let (gain, sigma) = pipeline.gain();
     let gain = sigma.map(|sigma| [gain, sigma].map(|share| 100.0 * f64::from(share)));

@@ -9,6 +9,7 @@ use crate::evaluate::rates::Rates;
 use crate::evaluate::report::{HEADINGS, MARKS, figures};
 use crate::plot::page::chart::{Chart, Curve};
 use crate::plot::page::{HINT, document, escaped, grouped, table};
+use gyronet::bias::STATIC_SAMPLES;
 use gyronet::sample::RATE_HZ;
 
 /// The curves of these methods are drawn, from back to front.
@@ -46,15 +47,23 @@ pub fn page(demo: &Demo<'_>) -> String {
         body += "<h2>Path</h2>\n";
         body += &paths(trajectories, demo.drive.vehicle.radius_m());
     }
-    let learnt = demo.learnt.charts();
+    // A simulated standstill has been put before a drive that begins in motion.
+    let is_later = demo.errors.is_some_and(|errors| errors.simulated_rest);
+    let start = if is_later { f64::from(STATIC_SAMPLES) / f64::from(RATE_HZ) } else { 0.0 };
+    let learnt = demo.learnt.charts(span(demo.rates), start);
     if !learnt.is_empty() {
         body += &format!(
-            "<h2>What the board learns</h2>\n<p class=\"note\">With every course of the drive; time begins with it.</p>\n{learnt}"
+            "<h2>What the board learns</h2>\n<p class=\"note\">With the drive's courses, where it has any. The bias is that when driving.</p>\n{learnt}"
         );
     }
     body += "<h2>Methods</h2>\n";
     body += &methods(demo);
     document(&format!("gyronet demo: {name}"), &body)
+}
+
+/// The time of the drive in which methods are compared, s, which all charts over time share.
+fn span(rates: &Rates) -> (f64, f64) {
+    rates.seconds.first().copied().zip(rates.seconds.last().copied()).unwrap_or((0.0, 1.0))
 }
 
 fn facts(demo: &Demo<'_>) -> String {
@@ -111,12 +120,12 @@ fn yaw(demo: &Demo<'_>) -> String {
         angles.push(Curve { class: REFERENCE, label, note: String::new(), points, in_scale: true });
     }
     let mut html =
-        Chart { title: "Angle", axes: "deg, over time in s", same_scale: false, curves: angles }.html();
+        Chart { title: "Angle", axes: "deg, over time in s", time: Some(span(rates)), curves: angles }.html();
     if truth.is_some() {
         html += &Chart {
             title: "Error against the reference",
             axes: "deg, over time in s",
-            same_scale: false,
+            time: Some(span(rates)),
             curves: errors,
         }
         .html();
@@ -165,7 +174,7 @@ fn paths(trajectories: &Trajectories, radius: f64) -> String {
     // The reference is drawn behind the methods compared with it.
     curves.sort_by_key(|curve| (curve.in_scale, curve.class != REFERENCE));
     let chart =
-        Chart { title: "Seen from above", axes: "m, from where it started", same_scale: true, curves }.html();
+        Chart { title: "Seen from above", axes: "m, from where it started", time: None, curves }.html();
     let speed = match wheels {
         0 => "speed by GNSS".to_owned(),
         1 => format!("speed of one wheel (radius {radius} m)"),

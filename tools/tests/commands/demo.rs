@@ -25,9 +25,9 @@ fn the_page_needs_nothing_else_and_says_what_the_json_says() {
         assert!(page.contains(&format!("<h2>{section}</h2>")), "{section}");
     }
     assert!(!page.contains("Simulated drive."), "it is a file like any other");
-    assert_eq!(page.matches("<svg").count(), 3);
-    // Five methods and the reference, five errors, three paths and the reference.
-    assert_eq!(page.matches("<polyline").count(), 15);
+    assert_eq!(page.matches("<svg").count(), 6);
+    // Five methods and the reference, five errors, three paths and the reference; bias, roll and pitch, each with its bounds.
+    assert_eq!(page.matches("<polyline").count(), 24);
     let ours = &json["methods"]["default"];
     for (figure, decimals) in [("mean_1s_rad", 4), ("final_rad", 3)] {
         let figure = ours[figure].as_f64().unwrap().to_degrees();
@@ -72,7 +72,7 @@ fn a_drive_without_reference_and_wheels_has_no_errors_and_no_path() {
     assert!(!text.contains('\u{1b}'), "no colours without a terminal");
     let page = std::fs::read_to_string(folder.join("demo.html")).unwrap();
     assert!(page.contains("<h1>bare &lt;drive&gt;</h1>") && !page.contains("<h2>Path</h2>"));
-    assert_eq!(page.matches("<svg").count(), 1);
+    assert_eq!(page.matches("<svg").count(), 4);
 }
 
 #[test]
@@ -96,9 +96,9 @@ fn a_drive_with_gnss_shows_its_course_its_track_and_its_errors() {
     assert!(off["error_m"].as_f64().is_some_and(|metres| metres < 2.0), "{off}");
     let page = std::fs::read_to_string(folder.join("demo.html")).unwrap();
     assert!(page.contains(">course by GNSS ") && page.contains(">GNSS receiver "));
-    // Five methods and the course, five errors, three paths, the reference and the receiver.
+    // Five methods and the course, five errors, three paths, the reference and the receiver; what is learnt, with gain.
     assert_eq!(
         page.matches("<polyline class=").count() - page.matches("<polyline class=\"curve").count(),
-        16
+        28
     );
 }

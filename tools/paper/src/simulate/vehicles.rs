@@ -1,7 +1,8 @@
 //! Defines the simulated vehicle and its sensors, with the source of every parameter.
 //!
-//! Those of the route are in `town.rs`, of the wheels in `odometer.rs`. No parameter was tuned to a result. (M) marks values recalled from a data
-//! sheet that was not available; (A) marks assumptions where nothing is published.
+//! Those of the route are in `town.rs`, of the wheels in `odometer.rs`, of tyres in `world.rs`, of delays in `delay.rs`. No
+//! parameter was tuned to a result. (M) marks values recalled from a data sheet that was not available; (A) marks
+//! assumptions where nothing is published.
 //!
 //! | what | value | source |
 //! |---|---|---|

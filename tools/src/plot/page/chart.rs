@@ -32,20 +32,21 @@ pub struct Chart<'a> {
     pub title: &'a str,
     /// The text after the title: the quantities and units of the axes.
     pub axes: &'a str,
-    /// True if both axes have the same scale; otherwise the horizontal axis is the time.
-    pub same_scale: bool,
+    /// The range of the horizontal axis, a time; `None` for a map, whose axes have the same scale.
+    pub time: Option<(f64, f64)>,
     /// The curves from back to front.
     pub curves: Vec<Curve>,
 }
 
 impl Chart<'_> {
     pub fn html(&self) -> String {
-        let kind = if self.same_scale { "map" } else { "time" };
+        let kind = if self.time.is_some() { "time" } else { "map" };
         let scaling = || self.curves.iter().filter(|curve| curve.in_scale);
-        let mut x = range(scaling().flat_map(|curve| curve.points.iter().map(|point| point.0)), 0.0);
+        let across = || range(scaling().flat_map(|curve| curve.points.iter().map(|point| point.0)), 0.0);
+        let mut x = self.time.unwrap_or_else(across);
         let mut y = range(scaling().flat_map(|curve| curve.points.iter().map(|point| point.1)), 0.06);
         let mut aspect = 1.0;
-        if self.same_scale {
+        if self.time.is_none() {
             (x, y, aspect) = same_scale(x, y);
         }
         let mut html = format!(
@@ -154,7 +155,7 @@ mod tests {
             in_scale,
         };
         let curves = vec![curve("raw", 1e6, false), curve("static", 1.0, true)];
-        let html = Chart { title: "yaw", axes: "s, deg", same_scale: false, curves }.html();
+        let html = Chart { title: "yaw", axes: "s, deg", time: Some((0.0, 10.0)), curves }.html();
         assert!(html.contains("<polyline class=\"raw free\""), "{html}");
         assert!(html.contains("10000,536\"/>"), "the end of the curve, below the air: {html}");
         assert!(!html.contains("1000000"), "kept near the edge: {html}");
