@@ -27,6 +27,7 @@ pub mod dtc;
 mod exchange;
 #[doc(hidden)]
 pub mod isotp;
+mod lock;
 mod response;
 mod routines;
 #[doc(hidden)]

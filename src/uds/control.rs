@@ -1,6 +1,7 @@
 //! These services control the server and the board: session, reset, communication, and the trouble memory.
 
-use super::exchange::{Exchange, Seed};
+use super::exchange::Exchange;
+use super::lock::Seed;
 use super::response::{Nrc, exactly, nrc, put};
 use super::session::Session;
 use crate::service::MappedSlots;

@@ -1,7 +1,8 @@
 //! The values behind the data identifiers (ISO 14229-1 C.1), big-endian. `gyronet reference identifiers` prints them.
 
-use super::exchange::{Exchange, Seed};
+use super::exchange::Exchange;
 use super::isotp::TransportErrors;
+use super::lock::Seed;
 use super::response::{Nrc, Response, decode, nrc, put, put_record};
 use crate::coprocessor::Contradiction;
 use crate::fog::FogCounters;

@@ -2,7 +2,8 @@
 //! the head of its update says ([`super::update`]), to address 2, the slot that does not run. Either is used from the
 //! next start on, and only after routine FF01; until then the old one stays.
 
-use super::exchange::{Download, Exchange, Seed};
+use super::exchange::{Download, Exchange};
+use super::lock::Seed;
 use super::response::{Nrc, nrc, put};
 use super::signature;
 use crate::service::MappedSlots;

@@ -2,9 +2,10 @@
 
 use super::dtc::Memory;
 use super::isotp::TransportErrors;
+use super::lock::Lock;
 use super::response::{Nrc, Response, nrc};
 use super::session::Session;
-use super::signature::{Digest, SEED};
+use super::signature::Digest;
 use super::update::Head;
 use crate::service::message::{AllCounters, Refusal};
 use crate::service::{Device, MappedSlots};
@@ -15,9 +16,6 @@ use embedded_storage::nor_flash::NorFlash;
 const SESSION_MS: u32 = 5_000;
 /// Time after a stall of the board in which the faults that it causes end, ms.
 const SETTLE_MS: u32 = 1_000;
-
-/// A random challenge.
-pub type Seed = [u8; SEED];
 
 #[derive(Debug)]
 pub(super) struct Services {
@@ -36,7 +34,7 @@ pub(super) struct Services {
     pub(super) download: Option<Download>,
     /// Head of a firmware update, and the counter of its signature.
     pub(super) update: Option<(Head, Option<u32>)>,
-    pub(super) security: Security,
+    pub(super) lock: Lock,
 }
 
 /// A request that is answered: what the services work on.
@@ -66,7 +64,7 @@ impl Services {
             is_restarting: false,
             download: None,
             update: None,
-            security: Security::new(),
+            lock: Lock::new(),
         }
     }
 
@@ -122,7 +120,7 @@ impl Services {
     pub(super) fn enter(&mut self, session: Session) {
         self.session = session;
         (self.download, self.update) = (None, None);
-        self.security.end();
+        self.lock.end();
         if session == Session::Default {
             self.memory.is_enabled = true;
             self.is_silenced = false;
@@ -167,27 +165,6 @@ impl Download {
     /// Returns the digest of the file, once the file has been checked, and whether it is firmware.
     pub fn checked(&self) -> Option<(Digest, bool)> {
         Some((self.digest?, self.image.is_some()))
-    }
-}
-
-#[derive(Debug)]
-pub(super) struct Security {
-    pub is_unlocked: bool,
-    pub seed: Option<Seed>,
-    /// Newest challenge; a repeated challenge shows that the random numbers have failed.
-    pub newest: Seed,
-    /// Time of the last wrong answer, or of the start, ms.
-    pub wrong_at: u32,
-}
-
-impl Security {
-    pub const fn new() -> Self {
-        Self { is_unlocked: false, seed: None, newest: [0; SEED], wrong_at: 0 }
-    }
-
-    pub fn end(&mut self) {
-        self.is_unlocked = false;
-        self.seed = None;
     }
 }
 

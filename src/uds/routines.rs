@@ -1,6 +1,7 @@
 //! Runs the routines (service 0x31): a self-test, to forget what was learnt, and the activation of a download.
 
-use super::exchange::{Download, Exchange, Seed};
+use super::exchange::{Download, Exchange};
+use super::lock::Seed;
 use super::response::{Nrc, exactly, nrc, put};
 use super::session::Session;
 use crate::service::MappedSlots;

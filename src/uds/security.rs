@@ -7,7 +7,8 @@
 //! one and doubles each time; it also runs after a restart. Signed data are not delayed, and end the delay: answers of
 //! others do not keep the owner out. Refusals are counted (data 0113) and reported as a trouble; `src/can/README.md` has the codes.
 
-use super::exchange::{Exchange, Seed};
+use super::exchange::Exchange;
+pub use super::lock::Seed;
 use super::response::{Nrc, exactly, nrc, put};
 use super::signature::{self, Digest, SEED, SERIAL, SIGNATURE, Statement, TRAILER};
 use crate::service::MappedSlots;
@@ -26,7 +27,7 @@ impl<R: NorFlash, W: MappedSlots, E: FnMut() -> Option<Seed>> Exchange<'_, R, W,
     pub fn require_access(&mut self) -> Result<(), Nrc> {
         match self.device.access() {
             Some(Access { key: None, .. }) => Ok(()),
-            _ if self.services.security.is_unlocked => Ok(()),
+            _ if self.services.lock.is_open() => Ok(()),
             _ => Err(self.refuse(Refusal::Locked)),
         }
     }
@@ -38,26 +39,24 @@ impl<R: NorFlash, W: MappedSlots, E: FnMut() -> Option<Seed>> Exchange<'_, R, W,
             2 => Some(exactly::<SIGNATURE>(rest)?),
             _ => return Err(Nrc::SubFunctionNotSupported),
         };
-        let security = &mut self.services.security;
+        let lock = &mut self.services.lock;
         let access = self.device.access().ok_or(Nrc::SecurityAccessDenied)?;
         let beyond = access.wrong.saturating_sub(FREE_ATTEMPTS);
         let delay = DELAY_MS << beyond.saturating_sub(1).min(MAX_DOUBLINGS);
-        if beyond > 0 && self.now.wrapping_sub(security.wrong_at) < delay {
+        if beyond > 0 && lock.since_wrong(self.now) < delay {
             return Err(Nrc::RequiredTimeDelayNotExpired);
         }
         let Some(answer) = answer else {
             // The challenge is zero if no answer is needed.
             let mut seed = [0; SEED];
-            if access.key.is_some() && !security.is_unlocked {
-                let new = (self.entropy)().filter(|seed| *seed != security.newest);
-                seed = new.ok_or(Nrc::ConditionsNotCorrect)?;
-                (security.seed, security.newest) = (Some(seed), seed);
+            if access.key.is_some() && !lock.is_open() {
+                seed = lock.challenge((self.entropy)()).ok_or(Nrc::ConditionsNotCorrect)?;
             }
             return put(self.out, &seed);
         };
         self.require_standstill()?;
-        let security = &mut self.services.security;
-        let (seed, key) = security.seed.take().zip(access.key).ok_or(Nrc::RequestSequenceError)?;
+        let lock = &mut self.services.lock;
+        let (seed, key) = lock.answered().zip(access.key).ok_or(Nrc::RequestSequenceError)?;
         let message = signature::challenge(self.device.serial(), &seed);
         let is_right = self.device.long(|| signature::is_valid(&key, &message, &answer));
         let wrong = if is_right { 0 } else { access.wrong.saturating_add(1) };
@@ -65,10 +64,10 @@ impl<R: NorFlash, W: MappedSlots, E: FnMut() -> Option<Seed>> Exchange<'_, R, W,
             self.device.store_access(Access { wrong, ..access }).map_err(nrc)?;
         }
         if is_right {
-            security.is_unlocked = true;
+            lock.open();
             return Ok(());
         }
-        security.wrong_at = self.now;
+        lock.was_wrong(self.now);
         self.device.refuse_request(Refusal::Answer);
         Err(if wrong > FREE_ATTEMPTS { Nrc::ExceedNumberOfAttempts } else { Nrc::InvalidKey })
     }
@@ -94,8 +93,10 @@ impl<R: NorFlash, W: MappedSlots, E: FnMut() -> Option<Seed>> Exchange<'_, R, W,
         self.device.store_access(Access { key, ..access }).map_err(nrc)?;
         // The session that stores the first key has access. One that replaces a key has not: a signature does not prove
         // that its sender has a private key, and an answer proves the key before.
-        self.services.security.end();
-        self.services.security.is_unlocked = key.is_some() && access.key.is_none();
+        self.services.lock.end();
+        if key.is_some() && access.key.is_none() {
+            self.services.lock.open();
+        }
         Ok(())
     }
 
@@ -152,7 +153,7 @@ impl<R: NorFlash, W: MappedSlots, E: FnMut() -> Option<Seed>> Exchange<'_, R, W,
     pub fn access_state(&mut self) -> Result<(), Nrc> {
         let access = self.device.access();
         let key = access.and_then(|access| access.key);
-        let state = match (access, self.services.security.is_unlocked) {
+        let state = match (access, self.services.lock.is_open()) {
             (Some(Access { key: None, .. }), _) => 0,
             (_, false) => 1,
             (_, true) => 2,

@@ -4,8 +4,9 @@
 //! than a tester waits. Troubles that must be stored with an erase wait for such a request. The faults that the erase
 //! causes on the board itself are no troubles.
 
-use super::exchange::{Exchange, Seed, Services};
+use super::exchange::{Exchange, Services};
 use super::isotp::{Bytes, Transport};
+use super::lock::Seed;
 use super::response::Nrc;
 use super::services::NEGATIVE;
 use crate::service::message::AllCounters;

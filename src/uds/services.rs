@@ -6,7 +6,8 @@
 //! standstill.
 
 use super::data::{UPDATE, is_writable};
-use super::exchange::{Exchange, Seed};
+use super::exchange::Exchange;
+use super::lock::Seed;
 use super::response::{Nrc, exactly, nrc, put};
 use super::session::{self, Session};
 use super::troubles;
