@@ -40,7 +40,7 @@ pub struct CourseConfig {
     pub walks: [f32; 2],
     /// How much the bias at rest and the bias on the road may differ, because the road shakes the sensor, rad/s.
     pub driving: f32,
-    /// Gain of a part before anything is learnt, 1 sigma.
+    /// Gain of a part before anything is learnt, 1 sigma; 0: it is not learnt.
     pub gain: f32,
 }
 

@@ -24,10 +24,9 @@ use std::path::PathBuf;
 
 /// Show all results of one drive: a table of errors, a page, a CAN log.
 ///
-/// The page (demo.html) needs only a browser. It has charts of yaw, errors and path, and of the bias, gain and tilt that the
-/// board learns, which can be zoomed, and the table
-/// of all methods, of which the terminal shows the best classical ones of each column, static initialisation without
-/// and with zero-rate updates, and ours. Without FILE the command takes the simulated drive that comes with it.
+/// The page (demo.html) needs only a browser. Its charts of yaw, errors and path, and of the bias, gain and tilt that the
+/// board learns, can be zoomed. Its table has all methods; the terminal shows the best classical ones of each column,
+/// static initialisation without and with zero-rate updates, and ours. Without FILE the command takes the simulated drive that comes with it.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\
 Examples:
