@@ -72,8 +72,6 @@ pub struct Sequence {
     pub path: PathBuf,
     /// The specification of a simulated sequence; `None` for a recorded one.
     pub simulated: Option<Spec>,
-    /// Says whether [`Step::specific_force`] and [`Step::angular_rate`] were measured; otherwise they are zero.
-    pub has_gyro: bool,
     /// Says whether [`Step::vendor_yaw`] comes from a vendor's filter.
     pub has_vendor: bool,
     /// Distance between the left and the right wheel, m.
@@ -99,7 +97,6 @@ struct Files {
     fog: Track<1>,
     wheels: Track<2>,
     truth: Track<3>,
-    has_gyro: bool,
     wheel_base: f64,
 }
 
@@ -155,7 +152,7 @@ impl Sequence {
         for step in &mut steps {
             step.position = [step.position[0] - x, step.position[1] - y];
         }
-        let (wheel_base, has_gyro, start_s) = (files.wheel_base, files.has_gyro, files.epoch_s + begin);
+        let (wheel_base, start_s) = (files.wheel_base, files.epoch_s + begin);
         let Files { imu, fog, wheels, truth, .. } = files;
         let mut files = [imu.finish()?, fog.finish()?, wheels.finish()?, truth.finish()?];
         summary::compare_ends(&mut files);
@@ -166,7 +163,6 @@ impl Sequence {
             name,
             path,
             simulated,
-            has_gyro,
             has_vendor,
             wheel_base,
             latitude,
@@ -204,8 +200,7 @@ impl Sequence {
 
     /// Converts the drive to a recording, as the other commands use it. Steps in a gap of the inertial sensor are left
     /// out, because a board would not receive them. The wheels become the rear right and rear left ones.
-    pub fn recording(&self) -> Result<Recording, DataError> {
-        self.needs_gyro()?;
+    pub fn recording(&self) -> Recording {
         let turns = self.turns();
         let steps = self.steps.iter().zip(&turns).enumerate().filter(|(_, (step, _))| !step.imu_gap);
         let rows = steps.filter_map(|(k, (step, turn))| {
@@ -225,7 +220,7 @@ impl Sequence {
             Some(RecordingRow { reference, wheels, ..RecordingRow::of(k as u64 + 1, sample) })
         });
         let path = self.path.display().to_string();
-        Ok(Recording { path, rows: rows.collect(), missing: 0, vehicle: Vehicle::default() })
+        Recording { path, rows: rows.collect(), missing: 0, vehicle: Vehicle::default() }
     }
 
     pub fn needs_standstill(&self) -> Result<(), DataError> {
@@ -235,15 +230,6 @@ impl Sequence {
             "starts moving: its wheels roll {metres:.2} m in the first 3 s; at most {STANDING} m count as standing"
         );
         if metres > STANDING { Err(DataError::because(self.path.display(), reason)) } else { Ok(()) }
-    }
-
-    pub fn needs_gyro(&self) -> Result<(), DataError> {
-        self.has_gyro.then_some(()).ok_or_else(|| {
-            DataError::because(
-                self.path.display(),
-                "xsens_imu.csv has 8 columns: no gyro and no accelerometer",
-            )
-        })
     }
 }
 

@@ -65,7 +65,6 @@ fn summary(sequence: &Sequence) -> std::io::Result<()> {
 
 fn write(args: &Args, sequence: &Sequence) -> super::Result {
     if let Some(path) = &args.out {
-        sequence.needs_gyro()?;
         if args.training {
             sequence.needs_standstill()?;
         }

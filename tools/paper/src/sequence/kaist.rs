@@ -1,7 +1,6 @@
 //! Reads KAIST Complex Urban: `sensor_data/{xsens_imu,fog,encoder}.csv`,
 //! `calibration/EncoderParameter.txt`, `global_pose.csv`. Files have no headers; stamps are nanoseconds since 1970; x
-//! forward, y left, z up. The early sequences (campus00, urban00 to 05) have no gyro: 8 columns in xsens_imu.csv
-//! instead of 17.
+//! forward, y left, z up. The early sequences (campus00, urban00 to 05), which have no gyro, are refused.
 //!
 //! Sources: the readers irapkaist/file_player and tsyxyz/kaist2bag, and the data set's page.
 
@@ -11,14 +10,10 @@ use super::summary::seconds;
 use super::track::{Track, Unwrap};
 use gyronet_tools::drive::error::DataError;
 use std::f64::consts::PI;
-use std::fs::File;
-use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
 /// The used columns are the quaternion x, y, z, w, and, after the Euler angles, angular rate and specific force.
 const IMU: Format = Format { columns: 17, used: &[1, 2, 3, 4, 8, 9, 10, 11, 12, 13], nominal_hz: 100.0 };
-/// The early sequences have only the vendor's orientation.
-const ORIENTATION: Format = Format { columns: 8, used: &[1, 2, 3, 4], nominal_hz: 100.0 };
 /// The used column is the yaw increment.
 const FOG: Format = Format { columns: 4, used: &[3], nominal_hz: 1000.0 };
 const ENCODER: Format = Format { columns: 3, used: &[1, 2], nominal_hz: 100.0 };
@@ -34,11 +29,8 @@ pub(super) const PATHS: [&str; 4] =
 pub(super) fn open(folder: &Path) -> Result<Files, DataError> {
     let [imu, fog, encoder, pose] = PATHS.map(|path| folder.join(path));
     let parameters = EncoderParameters::read(&folder.join(CALIBRATION))?;
-    let has_gyro = columns(&imu)? != ORIENTATION.columns;
     let mut vendor = Unwrap::default();
-    // Without a gyro the fields behind the attitude are zeros.
-    let imu = Rows::open(&imu, if has_gyro { IMU } else { ORIENTATION })?;
-    let imu = Track::new(imu, None, move |row, _, _| {
+    let imu = Track::new(Rows::open(&imu, IMU)?, None, move |row, _, _| {
         let [qx, qy, qz, qw, wx, wy, wz, fx, fy, fz] = row.fields;
         [fx, fy, fz, wx, wy, wz, vendor.angle(yaw([qx, qy, qz, qw]))]
     })?;
@@ -64,22 +56,11 @@ pub(super) fn open(folder: &Path) -> Result<Files, DataError> {
         [x, y, heading.angle(libm::atan2(r21, r11))]
     })?;
     let (epoch_s, wheel_base) = (seconds(imu.epoch), parameters.base);
-    Ok(Files { epoch_s, imu, fog, wheels: encoder, truth, has_gyro, wheel_base })
+    Ok(Files { epoch_s, imu, fog, wheels: encoder, truth, wheel_base })
 }
 
 pub(crate) fn yaw([x, y, z, w]: [f64; 4]) -> f64 {
     libm::atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-}
-
-/// Returns the number of columns of the first row, which tells the two kinds of file apart.
-fn columns(path: &Path) -> Result<usize, DataError> {
-    let name = path.display().to_string();
-    let file = File::open(path).map_err(|source| DataError::open(&name, source))?;
-    let mut line = String::new();
-    // A row of this file is about 200 bytes long.
-    let mut reader = BufReader::new(file).take(4096);
-    reader.read_line(&mut line).map_err(|source| DataError::of(&name, source.into()))?;
-    Ok(line.split(',').count())
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]

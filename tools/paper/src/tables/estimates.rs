@@ -23,7 +23,6 @@ use gyronet::sample::PERIOD_US;
 use gyronet::units::AngularRate;
 use gyronet_tools::drive::DT;
 use gyronet_tools::drive::replay::{Replay, Step};
-use gyronet_tools::drive::stream::Recording;
 use gyronet_tools::evaluate::fir::LowPass;
 use gyronet_tools::evaluate::methods::Method;
 use gyronet_tools::evaluate::trajectory_error::Point;
@@ -68,10 +67,7 @@ pub fn run(sequence: &Sequence, network: &mut impl WindowNetwork) -> Estimates {
     let start = (STATIC_SAMPLES as usize).min(sequence.steps.len());
     let mut estimates =
         Estimates { start, methods: Vec::new(), left_out: Vec::new(), fitted: None, refused: None };
-    match sequence.recording() {
-        Ok(recording) => estimates.inertial(sequence, &recording, network),
-        Err(error) => estimates.refused = Some(error.to_string()),
-    }
+    estimates.inertial(sequence, network);
     if sequence.has_vendor {
         estimates.add(Method::VENDOR, rates(sequence.steps.iter().map(|step| step.vendor_yaw)));
     }
@@ -87,12 +83,9 @@ pub fn run(sequence: &Sequence, network: &mut impl WindowNetwork) -> Estimates {
 }
 
 impl Estimates {
-    /// Adds the rates that the board sends, corrected by FoGNet with and without padding, if there is an inertial sensor.
-    /// Weights for another gyro are not run.
+    /// Adds the rates that the board sends, corrected by FoGNet with and without padding. Weights for another
+    /// gyro are not run.
     pub fn add_fognet(&mut self, sequence: &Sequence, network: &mut impl MinuteNetwork, trained: Training) {
-        if !sequence.has_gyro {
-            return;
-        }
         let fits = fog_replay::check_weights(sequence, trained);
         if let Err(error) = &fits {
             let before = self.refused.take().map(|before| before + "; ").unwrap_or_default();
@@ -123,14 +116,15 @@ impl Estimates {
         self.push(Method::PSEUDO_FOG, drive.turns[self.start..].to_vec());
     }
 
-    fn inertial(&mut self, sequence: &Sequence, recording: &Recording, network: &mut impl WindowNetwork) {
+    fn inertial(&mut self, sequence: &Sequence, network: &mut impl WindowNetwork) {
+        let recording = sequence.recording();
         let gyro: Vec<f64> = sequence.steps.iter().map(|step| f64::from(step.angular_rate[2])).collect();
         let constant = |rate: f64| gyro.iter().map(|z| z - rate).collect::<Vec<f64>>();
         // This is the paper's network alone, without zero-rate updates.
         let config = PipelineConfig { zero_rate: None, ..PipelineConfig::DEFAULT };
-        let drive = Replay::run(recording, &config, None, network);
+        let drive = Replay::run(&recording, &config, None, network);
         let wheels = recording.wheels();
-        let looped = Replay::run(recording, &PipelineConfig::DEFAULT, wheels, network);
+        let looped = Replay::run(&recording, &PipelineConfig::DEFAULT, wheels, network);
         self.add(Method::RAW, constant(0.0));
         match drive.and_then(|drive| Ok((drive, looped?))) {
             Ok((drive, looped)) => {
