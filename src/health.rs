@@ -181,115 +181,99 @@ pub const fn judge(status: Status) -> (Source, Quality) {
     }
 }
 
-/// Event counters since the start. They saturate.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Counters {
-    /// Samples that became frames.
-    pub samples: u32,
-    /// Grid steps that no sample filled.
-    pub missing: u32,
-    /// Samples refused: duplicate, backwards, or of a rate that is not used.
-    pub misplaced: u32,
-    /// Clock jumps of more than a second.
-    pub clock_jumps: u32,
-    /// Samples that could not be used: saturated, recovering, stuck or implausible.
-    pub invalid: u32,
-    /// Static initialisations refused because the vehicle moved.
-    pub moving: u32,
-    /// Windows that the network has run.
-    pub windows: u32,
-    /// Network inputs clamped to its range.
-    pub clamped_inputs: u32,
-    /// Windows rejected as implausible.
-    pub implausible: u32,
-    /// Windows whose estimate came too late or not at all.
-    pub late: u32,
-    /// Seconds at standstill that updated the bias.
-    pub zero_rate_updates: u32,
-    /// Seconds in which the gyro contradicted that the vehicle stands.
-    pub contradicted: u32,
-    /// Times that the sensor was found to be mounted differently than in earlier drives.
-    pub moved_mounts: u32,
-}
+/// Declares event counters, which saturate. Diagnosis sends them in the order of their fields.
+macro_rules! counters {
+    ($(#[$about:meta])* pub struct $name:ident { $($(#[$of:meta])* pub $field:ident: u32,)+ }) => {
+        $(#[$about])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+        #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+        pub struct $name {
+            $($(#[$of])* pub $field: u32,)+
+        }
 
-impl Counters {
-    /// All counters at zero.
-    pub const NONE: Self = Self {
-        samples: 0,
-        missing: 0,
-        misplaced: 0,
-        clock_jumps: 0,
-        invalid: 0,
-        moving: 0,
-        windows: 0,
-        clamped_inputs: 0,
-        implausible: 0,
-        late: 0,
-        zero_rate_updates: 0,
-        contradicted: 0,
-        moved_mounts: 0,
+        impl $name {
+            /// All counters at zero.
+            pub const NONE: Self = Self { $($field: 0),+ };
+
+            /// Returns the counters in the order in which diagnosis sends them.
+            pub const fn words(&self) -> [u32; [$(stringify!($field)),+].len()] {
+                [$(self.$field),+]
+            }
+        }
     };
 }
+pub(crate) use counters;
 
-/// Fault counters of the sensor ([`crate::monitor`]).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct MonitorCounters {
-    /// Times that the sensor became silent.
-    pub silences: u32,
-    /// Times that the sensor was stuck.
-    pub stuck: u32,
-    /// Samples not used because the sensor had just been saturated.
-    pub held: u32,
-    /// Readings further from the last good one than a vehicle moves in 10 ms.
-    pub wrong: u32,
-    /// Times that the sensor's clock was found to be too far off the board's ([`crate::align::clock_ratio`]).
-    pub clock_off: u32,
+counters! {
+    /// Event counters since the start. They saturate.
+    pub struct Counters {
+        /// Samples that became frames.
+        pub samples: u32,
+        /// Grid steps that no sample filled.
+        pub missing: u32,
+        /// Samples refused: duplicate, backwards, or of a rate that is not used.
+        pub misplaced: u32,
+        /// Clock jumps of more than a second.
+        pub clock_jumps: u32,
+        /// Samples that could not be used: saturated, recovering, stuck or implausible.
+        pub invalid: u32,
+        /// Static initialisations refused because the vehicle moved.
+        pub moving: u32,
+        /// Windows that the network has run.
+        pub windows: u32,
+        /// Network inputs clamped to its range.
+        pub clamped_inputs: u32,
+        /// Windows rejected as implausible.
+        pub implausible: u32,
+        /// Windows whose estimate came too late or not at all.
+        pub late: u32,
+        /// Seconds at standstill that updated the bias.
+        pub zero_rate_updates: u32,
+        /// Seconds in which the gyro contradicted that the vehicle stands.
+        pub contradicted: u32,
+        /// Times that the sensor was found to be mounted differently than in earlier drives.
+        pub moved_mounts: u32,
+    }
 }
 
-impl MonitorCounters {
-    /// All counters at zero.
-    pub const NONE: Self = Self { silences: 0, stuck: 0, held: 0, wrong: 0, clock_off: 0 };
+counters! {
+    /// Fault counters of the sensor ([`crate::monitor`]).
+    pub struct MonitorCounters {
+        /// Times that the sensor became silent.
+        pub silences: u32,
+        /// Times that the sensor was stuck.
+        pub stuck: u32,
+        /// Samples not used because the sensor had just been saturated.
+        pub held: u32,
+        /// Readings further from the last good one than a vehicle moves in 10 ms.
+        pub wrong: u32,
+        /// Times that the sensor's clock was found to be too far off the board's ([`crate::align::clock_ratio`]).
+        pub clock_off: u32,
+    }
 }
 
-/// Counters of inputs that were refused or replaced ([`crate::coprocessor`]). They saturate.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct InputCounters {
-    /// Messages of the inertial sensor that were not valid samples.
-    pub imu_errors: u32,
-    /// Messages of the fibre-optic gyro that were not valid samples.
-    pub fog_errors: u32,
-    /// Wheel frames that were corrupt or marked a speed as invalid.
-    pub wheel_errors: u32,
-    /// Frames whose latitude was too far from the one in use.
-    pub latitude_errors: u32,
-    /// Courses, speeds or latitudes that no vehicle has, short frames, damaged messages of a GNSS receiver.
-    pub heading_errors: u32,
-    /// Inputs with a time before the newest one.
-    pub clock_back: u32,
-    /// Estimates that no window waited for.
-    pub unclaimed_estimates: u32,
-    /// Windows that had not been taken when the next one was due.
-    pub replaced_windows: u32,
-    /// Messages that reported "failed" because a value does not fit its signal.
-    pub out_of_range: u32,
-}
-
-impl InputCounters {
-    /// All counters at zero.
-    pub const NONE: Self = Self {
-        imu_errors: 0,
-        fog_errors: 0,
-        wheel_errors: 0,
-        latitude_errors: 0,
-        heading_errors: 0,
-        clock_back: 0,
-        unclaimed_estimates: 0,
-        replaced_windows: 0,
-        out_of_range: 0,
-    };
+counters! {
+    /// Counters of inputs that were refused or replaced ([`crate::coprocessor`]). They saturate.
+    pub struct InputCounters {
+        /// Messages of the inertial sensor that were not valid samples.
+        pub imu_errors: u32,
+        /// Messages of the fibre-optic gyro that were not valid samples.
+        pub fog_errors: u32,
+        /// Wheel frames that were corrupt or marked a speed as invalid.
+        pub wheel_errors: u32,
+        /// Frames whose latitude was too far from the one in use.
+        pub latitude_errors: u32,
+        /// Courses, speeds or latitudes that no vehicle has, short frames, damaged messages of a GNSS receiver.
+        pub heading_errors: u32,
+        /// Inputs with a time before the newest one.
+        pub clock_back: u32,
+        /// Estimates that no window waited for.
+        pub unclaimed_estimates: u32,
+        /// Windows that had not been taken when the next one was due.
+        pub replaced_windows: u32,
+        /// Messages that reported "failed" because a value does not fit its signal.
+        pub out_of_range: u32,
+    }
 }
 
 /// Adds to a counter without wrapping.

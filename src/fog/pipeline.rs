@@ -14,7 +14,7 @@ use crate::align::clock_ratio::{ClockRatio, RatioEstimator};
 use crate::align::fog_grid::FogGrid;
 use crate::bias::Latitude;
 use crate::estimate::{AccumulatedYaw, YawEstimate};
-use crate::health::{Faults, Quality, Source, Status, count};
+use crate::health::{Faults, Quality, Source, Status, count, counters};
 use crate::sample::{FogSample, PERIOD_US, RATE_HZ, Standstill, WheelSample};
 use crate::sqrt::sqrt;
 use crate::units::{Angle, AngularRate, Micros, Yaw};
@@ -28,32 +28,20 @@ pub const STUCK_US: u32 = 10_000;
 /// Share by which a clock may be off before it has been measured: a quarter of what is accepted.
 const CLOCK: f32 = 0.01;
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct FogCounters {
-    pub samples: u32,
-    /// Samples refused: duplicate or out of order.
-    pub misplaced: u32,
-    /// Grid steps without a turn: increments are missing, or the gyro is stuck.
-    pub gaps: u32,
-    pub stuck: u32,
-    /// Steps without a known latitude: the Earth's rate is not subtracted.
-    pub no_latitude: u32,
-    pub zero_rate_updates: u32,
-    /// Seconds in which the gyro contradicted that the vehicle stands.
-    pub contradicted: u32,
-}
-
-impl FogCounters {
-    pub const NONE: Self = Self {
-        samples: 0,
-        misplaced: 0,
-        gaps: 0,
-        stuck: 0,
-        no_latitude: 0,
-        zero_rate_updates: 0,
-        contradicted: 0,
-    };
+counters! {
+    pub struct FogCounters {
+        pub samples: u32,
+        /// Samples refused: duplicate or out of order.
+        pub misplaced: u32,
+        /// Grid steps without a turn: increments are missing, or the gyro is stuck.
+        pub gaps: u32,
+        pub stuck: u32,
+        /// Steps without a known latitude: the Earth's rate is not subtracted.
+        pub no_latitude: u32,
+        pub zero_rate_updates: u32,
+        /// Seconds in which the gyro contradicted that the vehicle stands.
+        pub contradicted: u32,
+    }
 }
 
 #[derive(Debug, Clone)]

@@ -3,7 +3,7 @@
 use super::event::{CanFault, ClockFault, Crash, ResetCause, SensorFault};
 use crate::coprocessor::{Contradiction, Coprocessor};
 use crate::fog::FogCounters;
-use crate::health::{Counters, InputCounters, MonitorCounters, Status};
+use crate::health::{Counters, InputCounters, MonitorCounters, Status, counters};
 use crate::store::firmware::FirmwareError;
 use crate::store::slots::{SlotError, WeightSource};
 use crate::store::{Calibration, Configuration, Record, Slot, StoreError};
@@ -247,25 +247,23 @@ impl AllCounters {
     }
 }
 
-/// The counters of requests that were refused for lack of access since the start.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub struct AccessCounters {
-    /// Requests in a session without access.
-    pub locked: u32,
-    /// Written data without a signature.
-    pub unsigned: u32,
-    /// Wrong answers to a challenge.
-    pub answers: u32,
-    /// Wrong signatures.
-    pub signatures: u32,
-    /// Signatures that had already been used, or were older than the newest one used.
-    pub replayed: u32,
+counters! {
+    /// The counters of requests that were refused for lack of access since the start.
+    pub struct AccessCounters {
+        /// Requests in a session without access.
+        pub locked: u32,
+        /// Written data without a signature.
+        pub unsigned: u32,
+        /// Wrong answers to a challenge.
+        pub answers: u32,
+        /// Wrong signatures.
+        pub signatures: u32,
+        /// Signatures that had already been used, or were older than the newest one used.
+        pub replayed: u32,
+    }
 }
 
 impl AccessCounters {
-    /// All counters zero.
-    pub const NONE: Self = Self { locked: 0, unsigned: 0, answers: 0, signatures: 0, replayed: 0 };
-
     pub(crate) fn count(&mut self, refusal: &Refusal) {
         let counter = match refusal {
             Refusal::Locked => &mut self.locked,
@@ -279,22 +277,18 @@ impl AccessCounters {
     }
 }
 
-/// The error counters of the serial lines and the CAN bus.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub struct LineCounters {
-    /// Frames that were dropped on the SLCAN line.
-    pub unsent: u32,
-    /// Receive errors of the sensor and SLCAN lines: corrupt bytes and overruns.
-    pub line_errors: u32,
-    /// Observations that a task of lower priority missed for lack of time.
-    pub overruns: u32,
-    /// Text lines of hosts, on SLCAN and on the service line, that were refused.
-    pub service_errors: u32,
-    /// CAN frames that passed the filters but were lost because the queue was full.
-    pub frames_lost: u32,
-}
-
-impl LineCounters {
-    /// All counters zero.
-    pub const NONE: Self = Self { unsent: 0, line_errors: 0, overruns: 0, service_errors: 0, frames_lost: 0 };
+counters! {
+    /// The error counters of the serial lines and the CAN bus.
+    pub struct LineCounters {
+        /// Frames that were dropped on the SLCAN line.
+        pub unsent: u32,
+        /// Receive errors of the sensor and SLCAN lines: corrupt bytes and overruns.
+        pub line_errors: u32,
+        /// Observations that a task of lower priority missed for lack of time.
+        pub overruns: u32,
+        /// Text lines of hosts, on SLCAN and on the service line, that were refused.
+        pub service_errors: u32,
+        /// CAN frames that passed the filters but were lost because the queue was full.
+        pub frames_lost: u32,
+    }
 }

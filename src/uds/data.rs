@@ -1,16 +1,13 @@
 //! The values behind the data identifiers (ISO 14229-1 C.1), big-endian. `gyronet reference identifiers` prints them.
 
 use super::exchange::Exchange;
-use super::isotp::TransportErrors;
 use super::lock::Seed;
 use super::response::{Nrc, Response, decode, nrc, put, put_record};
 use crate::coprocessor::Contradiction;
-use crate::fog::FogCounters;
 use crate::heading::CourseCounters;
-use crate::health::{Counters, InputCounters, MonitorCounters};
 use crate::service::MappedSlots;
 use crate::service::device::Firmware;
-use crate::service::message::{AccessCounters, LineCounters, Refusal};
+use crate::service::message::Refusal;
 use crate::store::slots::WeightSource;
 use crate::store::{Calibration, Configuration, Record, Slot};
 use embedded_storage::nor_flash::NorFlash;
@@ -20,14 +17,6 @@ pub(super) const UPDATE: u16 = 0x011A;
 /// Identifiers of single settings, which were retired for the configuration (0100).
 const RETIRED_FIRST: u16 = 0x0201;
 const RETIRED_LAST: u16 = 0x021E;
-
-/// Lists the fields of a type in the given order; an omitted field is a compile error.
-macro_rules! words {
-    ($from:expr => $type:ident { $($field:ident),* }) => {{
-        let $type { $($field),* } = $from;
-        [$($field),*]
-    }};
-}
 
 impl<R: NorFlash, W: MappedSlots, E: FnMut() -> Option<Seed>> Exchange<'_, R, W, E> {
     pub(super) fn read(&mut self, id: u16) -> Result<(), Nrc> {
@@ -61,38 +50,15 @@ impl<R: NorFlash, W: MappedSlots, E: FnMut() -> Option<Seed>> Exchange<'_, R, W,
                 let now = device.conditions();
                 put(out, &[now.status as u8, now.faults.0])
             }
-            0x0105 => put_words(
-                out,
-                &words!(counters.pipeline => Counters {
-                    samples, missing, misplaced, clock_jumps, invalid, moving, windows, clamped_inputs, implausible, late,
-                    zero_rate_updates, contradicted, moved_mounts
-                }),
-            ),
+            0x0105 => put_words(out, &counters.pipeline.words()),
             0x0106 => {
-                let monitor =
-                    words!(counters.watch => MonitorCounters { silences, stuck, held, wrong, clock_off });
-                let inputs = words!(counters.inputs => InputCounters {
-                    imu_errors, fog_errors, wheel_errors, latitude_errors, heading_errors, clock_back, unclaimed_estimates,
-                    replaced_windows, out_of_range
-                });
-                let lines = words!(counters.lines => LineCounters {
-                    unsent, line_errors, overruns, service_errors, frames_lost
-                });
-                put_words(out, &monitor)?;
-                put_words(out, &inputs)?;
-                put_words(out, &lines)
+                put_words(out, &counters.watch.words())?;
+                put_words(out, &counters.inputs.words())?;
+                put_words(out, &counters.lines.words())
             }
-            0x0107 => put_words(
-                out,
-                &words!(*errors => TransportErrors { unexpected, sequence, overflow, timeout }),
-            ),
+            0x0107 => put_words(out, &errors.words()),
             0x0108 => put(out, &device.conditions().tick.to_be_bytes()),
-            0x0109 => put_words(
-                out,
-                &words!(counters.fog => FogCounters {
-                    samples, misplaced, gaps, stuck, no_latitude, zero_rate_updates, contradicted
-                }),
-            ),
+            0x0109 => put_words(out, &counters.fog.words()),
             0x010A => put_record(out, &device.info()),
             0x010B => put_record(
                 out,
@@ -100,12 +66,7 @@ impl<R: NorFlash, W: MappedSlots, E: FnMut() -> Option<Seed>> Exchange<'_, R, W,
             ),
             0x0111 => self.access_state(),
             0x0112 => put(out, &counters.fog.samples.to_be_bytes()),
-            0x0113 => put_words(
-                out,
-                &words!(device.access_counters() => AccessCounters {
-                    locked, unsigned, answers, signatures, replayed
-                }),
-            ),
+            0x0113 => put_words(out, &device.access_counters().words()),
             0x0115 => put_record(out, device.learned()),
             0x0116 => {
                 let known = device.forward_deg();
@@ -128,7 +89,8 @@ impl<R: NorFlash, W: MappedSlots, E: FnMut() -> Option<Seed>> Exchange<'_, R, W,
                 codes
                     .iter()
                     .try_for_each(|share| put(out, &(libm::roundf(1e5 * share) as i16).to_be_bytes()))?;
-                put_words(out, &words!(course.counters => CourseCounters { used, refused, restarts }))?;
+                let CourseCounters { used, refused, restarts } = course.counters;
+                put_words(out, &[used, refused, restarts])?;
                 put(out, &[course.refusal.map_or(0, |refusal| refusal as u8)])
             }
             0x011B => {

@@ -6,7 +6,7 @@
 //! sender it counts the tester's separation time from the end of a frame on the bus, which the caller reports.
 
 use super::signature::TRAILER;
-use crate::health::count;
+use crate::health::{count, counters};
 use crate::service::message::BLOCK as DOWNLOAD_BLOCK;
 use crate::store::record::MAX_LEN;
 use heapless::Vec;
@@ -28,16 +28,17 @@ const PADDING: u8 = 0xCC;
 
 pub type Bytes = [u8; 8];
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct TransportErrors {
-    /// Frames that were unexpected, or had an invalid length, type or flow status.
-    pub unexpected: u32,
-    /// Messages with a missing or repeated frame.
-    pub sequence: u32,
-    /// Messages that were too long for us ([`MAX_MESSAGE`]) or for the tester.
-    pub overflow: u32,
-    /// Messages whose next frame or flow control did not arrive in time.
-    pub timeout: u32,
+counters! {
+    pub struct TransportErrors {
+        /// Frames that were unexpected, or had an invalid length, type or flow status.
+        pub unexpected: u32,
+        /// Messages with a missing or repeated frame.
+        pub sequence: u32,
+        /// Messages that were too long for us ([`MAX_MESSAGE`]) or for the tester.
+        pub overflow: u32,
+        /// Messages whose next frame or flow control did not arrive in time.
+        pub timeout: u32,
+    }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -96,7 +97,7 @@ impl Transport {
         request: Vec::new(),
         response: Vec::new(),
         urgent: None,
-        errors: TransportErrors { unexpected: 0, sequence: 0, overflow: 0, timeout: 0 },
+        errors: TransportErrors::NONE,
     };
 
     /// Returns the request once it is complete, until it is answered.
