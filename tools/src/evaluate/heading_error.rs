@@ -93,24 +93,22 @@ pub(super) fn median(mut values: Vec<f64>) -> Option<f64> {
 }
 
 /// A median of magnitudes in progress, by counting classes of 5 mrad up to 50 rad.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 struct Typical {
+    /// The counts of the classes up to the largest that was needed.
     classes: Vec<u64>,
     count: u64,
 }
 
 impl Typical {
     const CLASS: f64 = 0.005;
-
-    fn new() -> Self {
-        Self { classes: vec![0; 10_001], count: 0 }
-    }
+    const LAST: usize = 10_000;
 
     fn add(&mut self, value: f64) {
         // A value at the upper end of a class belongs to it.
-        let class = (value / Self::CLASS).ceil() as usize;
-        let last = self.classes.len() - 1;
-        self.classes[class.min(last)] += 1;
+        let class = ((value / Self::CLASS).ceil() as usize).min(Self::LAST);
+        self.classes.resize(self.classes.len().max(class + 1), 0);
+        self.classes[class] += 1;
         self.count += 1;
     }
 
@@ -124,11 +122,9 @@ impl Typical {
     }
 }
 
-/// The changes of an error over windows of different length, from one step to a later one.
-#[derive(Debug, Clone)]
-struct Changes {
-    /// Seconds from one error to the next.
-    step_s: usize,
+/// The changes of an error over windows of different length, from one step to a later one; a step is `STEP_S` seconds.
+#[derive(Debug, Clone, Default)]
+struct Changes<const STEP_S: usize> {
     /// The errors of the last minute, rad; `None` while the reference is unknown.
     recent: VecDeque<Option<f64>>,
     second: Mean,
@@ -137,16 +133,10 @@ struct Changes {
     typical: Typical,
 }
 
-impl Changes {
-    fn new(step_s: usize) -> Self {
-        let (recent, typical) = (VecDeque::with_capacity(64), Typical::new());
-        let [second, minute, squares] = [Mean::default(); 3];
-        Self { step_s, recent, second, minute, squares, typical }
-    }
-
+impl<const STEP_S: usize> Changes<STEP_S> {
     fn add(&mut self, error: Option<f64>) {
         let change = |seconds: usize| {
-            let earlier = self.recent.iter().rev().nth((seconds / self.step_s).checked_sub(1)?)?;
+            let earlier = self.recent.iter().rev().nth((seconds / STEP_S).checked_sub(1)?)?;
             Some((error? - (*earlier)?).abs())
         };
         let [second, typical, minute] = [1, 10, 60].map(change);
@@ -155,7 +145,7 @@ impl Changes {
         self.minute.add(minute);
         self.squares.add(error.map(|error| error * error));
         self.recent.push_back(error);
-        if self.recent.len() > 60 / self.step_s {
+        if self.recent.len() > 60 / STEP_S {
             self.recent.pop_front();
         }
     }
@@ -176,12 +166,12 @@ impl Changes {
 pub struct AgainstRate {
     angle: f64,
     samples: usize,
-    changes: Changes,
+    changes: Changes<1>,
 }
 
 impl Default for AgainstRate {
     fn default() -> Self {
-        let mut changes = Changes::new(1);
+        let mut changes = Changes::default();
         changes.add(Some(0.0));
         Self { angle: 0.0, samples: 0, changes }
     }
@@ -247,7 +237,7 @@ impl Blocks {
     }
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct AgainstCourse {
     off: OffCourse,
     blocks: Blocks,
@@ -260,23 +250,7 @@ pub struct AgainstCourse {
     /// Medians of blocks that wait for the alignment.
     waiting: Vec<Option<f64>>,
     errors: Vec<Option<f64>>,
-    changes: Changes,
-}
-
-impl Default for AgainstCourse {
-    fn default() -> Self {
-        Self {
-            off: OffCourse::default(),
-            blocks: Blocks::default(),
-            samples: 0,
-            known: None,
-            begin: Vec::new(),
-            aligned: None,
-            waiting: Vec::new(),
-            errors: Vec::new(),
-            changes: Changes::new(BLOCK_S),
-        }
-    }
+    changes: Changes<BLOCK_S>,
 }
 
 impl AgainstCourse {
