@@ -11,8 +11,8 @@ use gyronet::health::{Counters, InputCounters, MonitorCounters};
 use gyronet::service::message::{AccessCounters, AllCounters, Info, LineCounters, PROTOCOL};
 use gyronet::store::{Calibration, Configuration, Learned, Record, UnitMap};
 use gyronet::uds::Session;
-use serde::de::value::{Error, SeqAccessDeserializer};
-use serde::de::{DeserializeOwned, DeserializeSeed, IntoDeserializer, SeqAccess};
+use serde::de::DeserializeOwned;
+use serde::de::value::{Error, SeqAccessDeserializer, SeqDeserializer};
 
 /// Data identifier of the configuration, which follows the version of its layout.
 pub const CONFIGURATION: u16 = 0x0100;
@@ -225,20 +225,13 @@ impl Words<'_> {
 
     /// Decodes a type from as many words as it has fields, in the order of their declaration.
     fn fields<T: DeserializeOwned>(&mut self) -> Result<T> {
-        T::deserialize(SeqAccessDeserializer::new(self)).map_err(|_| DeviceError::Mismatch)
-    }
-}
-
-impl<'de> SeqAccess<'de> for &mut Words<'_> {
-    type Error = Error;
-
-    fn next_element_seed<T: DeserializeSeed<'de>>(
-        &mut self,
-        seed: T,
-    ) -> std::result::Result<Option<T::Value>, Error> {
-        let Some((word, rest)) = self.0.split_first_chunk() else { return Ok(None) };
-        self.0 = rest;
-        seed.deserialize(u32::from_be_bytes(*word).into_deserializer()).map(Some)
+        let words = std::iter::from_fn(|| {
+            let (word, rest) = self.0.split_first_chunk()?;
+            self.0 = rest;
+            Some(u32::from_be_bytes(*word))
+        });
+        let fields = SeqDeserializer::<_, Error>::new(words);
+        T::deserialize(SeqAccessDeserializer::new(fields)).map_err(|_| DeviceError::Mismatch)
     }
 }
 
