@@ -14,7 +14,7 @@ const FIRST: usize = 1_000;
 /// Most rows that are kept: a day at 100 Hz.
 const MOST: usize = 8_640_000;
 
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Rows {
     pub name: String,
     pub file: String,
@@ -65,16 +65,7 @@ impl Rows {
             name: name.to_owned(),
             file: format!("{name}.csv"),
             period: period.map(|us| 1e-6 * us),
-            seconds: Vec::new(),
-            force: Vec::new(),
-            rate: Vec::new(),
-            reference: Vec::new(),
-            course: Vec::new(),
-            speed: Vec::new(),
-            wheels: Default::default(),
-            bad: 0,
-            first_bad: None,
-            vehicle: Vehicle::default(),
+            ..Self::default()
         };
         let mut start = None;
         for row in reader {

@@ -2,7 +2,7 @@
 //!
 //! The filter is a sinc with a Hamming window. Its delay of half its length is compensated, as that of the delayed
 //! rate is. So it shows what smoothing alone gains with the same inputs and no more delay. Length and corner
-//! frequency are the best on the training drives (`host-tests/tests/tools/fir_choice.rs` compares them with a grid).
+//! frequency are the best on the training drives.
 
 use gyronet::sample::RATE_HZ;
 use std::collections::VecDeque;

@@ -123,7 +123,7 @@ impl Method {
     }
 }
 
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct PerMethod<T>([Option<T>; Method::ON_A_DRIVE.len()]);
 
 impl<T> PerMethod<T> {

@@ -188,7 +188,7 @@ impl SideBySide {
 }
 
 /// The rates of the compared samples of a drive in memory, for its curves, with what its references say.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Rates {
     /// Time of each sample since the first sample of the recording, s.
     pub seconds: Vec<f64>,
@@ -212,17 +212,10 @@ pub struct Rates {
 impl Rates {
     pub fn of(drive: &Drive<'_>) -> Self {
         Self {
-            seconds: Vec::new(),
-            rates: PerMethod::new(|_| None),
             reference: Some(Vec::new()),
-            courses: Vec::new(),
-            speeds: Vec::new(),
-            places: Vec::new(),
             first: drive.facts.first,
             wheels: drive.speeds(),
-            speed: None,
-            off_course: OffCourse::default(),
-            place: None,
+            ..Self::default()
         }
     }
 

@@ -5,7 +5,7 @@ use gyronet_tools::simulate::mems::{axes, seen};
 use gyronet_tools::simulate::purpose::Purpose;
 
 /// Holds the sizes of the gyro's errors. Those marked sigma are drawn for each device or run, and axis.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Config {
     /// Angle random walk, rad/sqrt(s).
     pub angle_walk: f64,
@@ -69,14 +69,7 @@ mod tests {
 
     #[test]
     fn walks_as_configured() {
-        let config = Config {
-            angle_walk: 3.5e-6,
-            device_bias: 0.0,
-            run_bias: 0.0,
-            bias_walk: 0.0,
-            scale: 0.0,
-            misalignment: 0.0,
-        };
+        let config = Config { angle_walk: 3.5e-6, ..Config::default() };
         let squares: f64 = (0..200)
             .map(|run| {
                 let mut fog = Fog::of_device(&config, 1, run);
@@ -90,14 +83,7 @@ mod tests {
 
     #[test]
     fn the_device_stays_and_the_run_changes() {
-        let config = Config {
-            angle_walk: 0.0,
-            device_bias: 1e-6,
-            run_bias: 0.0,
-            bias_walk: 0.0,
-            scale: 1e-4,
-            misalignment: 0.0,
-        };
+        let config = Config { device_bias: 1e-6, scale: 1e-4, ..Config::default() };
         let turned = |device, run| Fog::of_device(&config, device, run).increment([0.0, 0.0, 1.0], 1.0);
         assert_eq!(turned(1, 1), turned(1, 2));
         assert_ne!(turned(1, 1), turned(2, 1));

@@ -50,7 +50,7 @@ impl Places {
     pub const RECKONED: Self = Self::Reckoned { scale: 1.0 };
 }
 
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Estimates {
     /// Index of the first compared step, after static initialisation.
     pub start: usize,
@@ -65,8 +65,7 @@ pub struct Estimates {
 
 pub fn run(sequence: &Sequence, network: &mut impl WindowNetwork) -> Estimates {
     let start = (STATIC_SAMPLES as usize).min(sequence.steps.len());
-    let mut estimates =
-        Estimates { start, methods: Vec::new(), left_out: Vec::new(), fitted: None, refused: None };
+    let mut estimates = Estimates { start, ..Estimates::default() };
     estimates.inertial(sequence, network);
     if sequence.has_vendor {
         estimates.add(Method::VENDOR, rates(sequence.steps.iter().map(|step| step.vendor_yaw)));
