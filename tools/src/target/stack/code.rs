@@ -100,7 +100,7 @@ impl Code {
         for (at, first, second) in thumb::instructions(body, address, is_data) {
             let effect = thumb::effect(first, second, at);
             match (made.take(), effect) {
-                (Some((register, target)), Effect::Indirect { register: to }) if register == to => {
+                (Some((register, target)), Effect::Indirect(to)) if register == to => {
                     function.calls.insert(target);
                     continue;
                 }
@@ -112,20 +112,20 @@ impl Code {
             match effect {
                 Effect::None => {}
                 Effect::Push(bytes) => function.own += bytes,
-                Effect::Align { register, bytes } => aligned[usize::from(register)] = bytes,
+                Effect::Align(register, bytes) => aligned[usize::from(register)] = bytes,
                 // A rounded register aligns the frame on a larger boundary; any other register restores the stack.
-                Effect::MoveSp { register } => {
+                Effect::MoveSp(register) => {
                     function.own += std::mem::take(&mut aligned[usize::from(register)]);
                 }
                 Effect::Dynamic => return Err(StackError::Dynamic { function: function.name, address: at }),
-                Effect::Indirect { .. } | Effect::Loaded => function.indirect += 1,
+                Effect::Indirect(_) | Effect::Loaded => function.indirect += 1,
                 // A branch inside the function is a loop or a condition; a branch to the outside is a tail call.
                 Effect::Branch(target) if (address..end).contains(&target) => {}
                 Effect::Call(target) | Effect::Branch(target) => {
                     function.calls.insert(target);
                 }
-                Effect::MoveLow { register, value } => low[usize::from(register)] = value,
-                Effect::MoveHigh { register, value } => {
+                Effect::MoveLow(register, value) => low[usize::from(register)] = value,
+                Effect::MoveHigh(register, value) => {
                     let target = begins(low[usize::from(register)] | value << 16);
                     made = target.map(|target| (register, target));
                 }

@@ -3,6 +3,9 @@
 //! Only instructions that affect one of them are decoded (ARMv7-M Architecture Reference Manual, A7.7); all others
 //! are [`Effect::None`].
 
+/// The number of a register.
+type Register = u8;
+
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Effect {
     /// The instruction affects neither the stack pointer nor the control flow.
@@ -11,33 +14,20 @@ pub enum Effect {
     Push(u32),
     /// The stack grows by a register's value.
     Dynamic,
-    /// A register is rounded down by less than this many bytes; it may become the stack pointer.
-    Align {
-        register: u8,
-        bytes: u32,
-    },
+    /// A register is rounded down by less than so many bytes; it may become the stack pointer.
+    Align(Register, u32),
     /// A register becomes the stack pointer.
-    MoveSp {
-        register: u8,
-    },
+    MoveSp(Register),
     Call(u32),
     Branch(u32),
     /// A call or jump to a register's value.
-    Indirect {
-        register: u8,
-    },
+    Indirect(Register),
     /// A jump to an address that is loaded from memory.
     Loaded,
-    /// The lower half of a register is set.
-    MoveLow {
-        register: u8,
-        value: u32,
-    },
-    /// The upper half of a register is set; the lower half is unchanged.
-    MoveHigh {
-        register: u8,
-        value: u32,
-    },
+    /// The lower half of a register is set to a value.
+    MoveLow(Register, u32),
+    /// The upper half of a register is set to a value; the lower half is unchanged.
+    MoveHigh(Register, u32),
 }
 
 const SP: u16 = 13;
@@ -85,13 +75,11 @@ fn narrow(code: u16, address: u32) -> Effect {
         // SUB sp, #imm7 * 4
         _ if code & 0xFF80 == 0xB080 => Effect::Push(4 * u32::from(code & 0x7F)),
         // MOV sp, Rm
-        _ if code & 0xFF87 == 0x4685 => Effect::MoveSp { register: (code >> 3 & 0xF) as u8 },
+        _ if code & 0xFF87 == 0x4685 => Effect::MoveSp((code >> 3 & 0xF) as u8),
         // BLX Rm
-        _ if code & 0xFF87 == 0x4780 => Effect::Indirect { register: (code >> 3 & 0xF) as u8 },
+        _ if code & 0xFF87 == 0x4780 => Effect::Indirect((code >> 3 & 0xF) as u8),
         // BX Rm; BX lr returns
-        _ if code & 0xFF87 == 0x4700 && code != 0x4770 => {
-            Effect::Indirect { register: (code >> 3 & 0xF) as u8 }
-        }
+        _ if code & 0xFF87 == 0x4700 && code != 0x4770 => Effect::Indirect((code >> 3 & 0xF) as u8),
         // B; UDF and SVC have the condition codes 0xE and 0xF.
         _ if code & 0xF800 == 0xE000 => branch(sign(u32::from(code & 0x7FF) << 1, 12)),
         _ if code & 0xF000 == 0xD000 && code >> 8 & 0xF < 0xE => branch(sign(u32::from(code & 0xFF) << 1, 9)),
@@ -120,9 +108,7 @@ fn wide(first: u16, second: u16, address: u32) -> Effect {
         // SUB.W sp, sp, Rm
         _ if first & 0xFFEF == 0xEBAD && rd == SP => Effect::Dynamic,
         // BFC Rd, #0, #width
-        (0xF36F, _) if second & 0x70C0 == 0 => {
-            Effect::Align { register: rd as u8, bytes: 1 << ((second & 0x1F) + 1).min(10) }
-        }
+        (0xF36F, _) if second & 0x70C0 == 0 => Effect::Align(rd as u8, 1 << ((second & 0x1F) + 1).min(10)),
         // LDR pc, [Rn, ...]; from the stack it is a return
         _ if first & 0xFF70 == 0xF850 && rt == PC && rn != SP => Effect::Loaded,
         // BL, B.W
@@ -142,10 +128,10 @@ fn wide(first: u16, second: u16, address: u32) -> Effect {
         }
         // MOVW, MOVT
         _ if first & 0xFBF0 == 0xF240 && second & 0x8000 == 0 => {
-            Effect::MoveLow { register: rd as u8, value: imm16(first, second) }
+            Effect::MoveLow(rd as u8, imm16(first, second))
         }
         _ if first & 0xFBF0 == 0xF2C0 && second & 0x8000 == 0 => {
-            Effect::MoveHigh { register: rd as u8, value: imm16(first, second) }
+            Effect::MoveHigh(rd as u8, imm16(first, second))
         }
         _ => Effect::None,
     }
@@ -200,11 +186,11 @@ mod tests {
         assert_eq!(narrow(0xB5F0), Effect::Push(20)); // push {r4, r5, r6, r7, lr}
         assert_eq!(narrow(0xB084), Effect::Push(16)); // sub sp, #16
         assert_eq!(narrow(0xB004), Effect::None); // add sp, #16
-        assert_eq!(narrow(0x4798), Effect::Indirect { register: 3 }); // blx r3
+        assert_eq!(narrow(0x4798), Effect::Indirect(3)); // blx r3
         assert_eq!(narrow(0x4770), Effect::None); // bx lr
-        assert_eq!(narrow(0x4760), Effect::Indirect { register: 12 }); // bx r12
-        assert_eq!(narrow(0x46A5), Effect::MoveSp { register: 4 }); // mov sp, r4
-        assert_eq!(wide(0xF36F, 0x0402), Effect::Align { register: 4, bytes: 8 }); // bfc r4, #0, #3
+        assert_eq!(narrow(0x4760), Effect::Indirect(12)); // bx r12
+        assert_eq!(narrow(0x46A5), Effect::MoveSp(4)); // mov sp, r4
+        assert_eq!(wide(0xF36F, 0x0402), Effect::Align(4, 8)); // bfc r4, #0, #3
         assert_eq!(narrow(0xE7FE), Effect::Branch(0x0801_0000)); // b .
         assert_eq!(narrow(0xD1FC), Effect::Branch(0x0800_FFFC)); // bne .-4
         assert_eq!(narrow(0xDE00), Effect::None); // udf #0
@@ -218,8 +204,8 @@ mod tests {
         assert_eq!(wide(0xF7FF, 0xFFFE), Effect::Call(0x0801_0000)); // bl .
         assert_eq!(wide(0xF000, 0xB800), Effect::Branch(0x0801_0004)); // b.w .+4
         assert_eq!(wide(0xF040, 0x8002), Effect::Branch(0x0801_0008)); // bne.w .+8
-        assert_eq!(wide(0xF641, 0x2334), Effect::MoveLow { register: 3, value: 0x1A34 }); // movw r3
-        assert_eq!(wide(0xF6C0, 0x0301), Effect::MoveHigh { register: 3, value: 0x0801 }); // movt r3
+        assert_eq!(wide(0xF641, 0x2334), Effect::MoveLow(3, 0x1A34)); // movw r3
+        assert_eq!(wide(0xF6C0, 0x0301), Effect::MoveHigh(3, 0x0801)); // movt r3
         assert_eq!(wide(0xF8D0, 0xF004), Effect::Loaded); // ldr.w pc, [r0, #4]
         assert_eq!(wide(0xF85D, 0xFB04), Effect::None); // ldr pc, [sp], #4
     }
