@@ -61,7 +61,8 @@ pub struct Step {
     pub position: [f64; 2],
     /// True heading, not wrapped, rad.
     pub yaw: f64,
-    /// Heading by the filter of the inertial sensor's vendor, not wrapped, rad.
+    /// Heading by the filter of the inertial sensor's vendor, not wrapped, rad; of a simulated sequence the gyro's
+    /// integral.
     pub vendor_yaw: f64,
 }
 
@@ -72,8 +73,6 @@ pub struct Sequence {
     pub path: PathBuf,
     /// The specification of a simulated sequence; `None` for a recorded one.
     pub simulated: Option<Spec>,
-    /// Says whether [`Step::vendor_yaw`] comes from a vendor's filter.
-    pub has_vendor: bool,
     /// Distance between the left and the right wheel, m.
     pub wheel_base: f64,
     /// Latitude of the first pose, deg, if poses are in UTM.
@@ -129,8 +128,6 @@ impl Sequence {
         }
         let simulated = marker(folder)?;
         let mut files = kaist::open(folder)?;
-        // The heading beside the sensor's data in a simulated sequence does not come from a vendor's filter.
-        let has_vendor = simulated.is_none();
         let begin = files.begin()?;
         let mut steps = Vec::new();
         let mut in_gap = [0; 4];
@@ -163,7 +160,6 @@ impl Sequence {
             name,
             path,
             simulated,
-            has_vendor,
             wheel_base,
             latitude,
             start_s,

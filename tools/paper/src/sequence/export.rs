@@ -34,7 +34,7 @@ fn write(sequence: &Sequence, out: impl Write, kept: impl Fn(&Step) -> bool) -> 
         let [left_rate, right_rate] = sequence.wheel_rates(step);
         let [x, y] = step.position;
         let rest = [turn / DT, right_rate, left_rate, step.fog, left, right, x, y, step.yaw];
-        let vendor_yaw = sequence.has_vendor.then_some(step.vendor_yaw);
+        let vendor_yaw = sequence.simulated.is_none().then_some(step.vendor_yaw);
         out.serialize((time, step.specific_force, step.angular_rate, rest, vendor_yaw))?;
         rows += 1;
     }

@@ -67,7 +67,7 @@ pub fn run(sequence: &Sequence, network: &mut impl WindowNetwork) -> Estimates {
     let start = (STATIC_SAMPLES as usize).min(sequence.steps.len());
     let mut estimates = Estimates { start, ..Estimates::default() };
     estimates.inertial(sequence, network);
-    if sequence.has_vendor {
+    if sequence.simulated.is_none() {
         estimates.add(Method::VENDOR, rates(sequence.steps.iter().map(|step| step.vendor_yaw)));
     }
     let by_wheels = |step: &sequence::Step| (step.wheels[1] - step.wheels[0]) / sequence.wheel_base;

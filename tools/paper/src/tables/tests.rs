@@ -41,7 +41,6 @@ fn exact() -> Sequence {
         name: "urban18".into(),
         path: PathBuf::from("urban18"),
         simulated: None,
-        has_vendor: true,
         wheel_base: 1.5,
         latitude: None,
         start_s: 1.5e9,
