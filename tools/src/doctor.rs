@@ -62,8 +62,7 @@ impl Doctor {
     fn of(rows: &Rows) -> Self {
         let (standstills, driven) = standstill::find(rows);
         let longest = standstills.iter().max_by_key(|span| span.len());
-        let allan = allan::at_rest(rows, longest);
-        let noise = allan.map(|allan| [0, 1, 2].map(|axis: usize| allan[axis].noise()));
+        let noise = allan::at_rest(rows, longest);
         let mounting = longest.and_then(|span| Mounting::at_rest(&rows.force[span.clone()]));
 
         let forward = forward::find(rows, mounting.as_ref());

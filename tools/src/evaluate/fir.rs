@@ -15,26 +15,20 @@ pub struct LowPass {
     taps: Vec<f64>,
 }
 
+/// Taps on either side of the middle one.
+const HALF: usize = 5;
+const CORNER_HZ: f64 = 5.0;
+
 impl LowPass {
-    /// Taps of the chosen filter on either side of the middle one.
-    pub const HALF: usize = 5;
-    /// Corner frequency of the chosen filter, Hz.
-    pub const CORNER_HZ: f64 = 5.0;
-
     pub fn chosen() -> Self {
-        Self::new(Self::HALF, Self::CORNER_HZ)
-    }
-
-    /// Creates a filter with `half` taps on either side of the middle one.
-    pub fn new(half: usize, corner_hz: f64) -> Self {
         let tap = |k: usize| {
-            let from_middle = k as f64 - half as f64;
+            let from_middle = k as f64 - HALF as f64;
             // The window ends one sample beyond the first and the last tap.
-            let window = 0.54 + 0.46 * (PI * from_middle / (half + 1) as f64).cos();
-            let phase = 2.0 * PI * corner_hz / f64::from(RATE_HZ) * from_middle;
+            let window = 0.54 + 0.46 * (PI * from_middle / (HALF + 1) as f64).cos();
+            let phase = 2.0 * PI * CORNER_HZ / f64::from(RATE_HZ) * from_middle;
             window * if phase == 0.0 { 1.0 } else { phase.sin() / phase }
         };
-        let taps: Vec<f64> = (0..=2 * half).map(tap).collect();
+        let taps: Vec<f64> = (0..=2 * HALF).map(tap).collect();
         let sum: f64 = taps.iter().sum();
         Self { taps: taps.iter().map(|tap| tap / sum).collect() }
     }
