@@ -63,7 +63,7 @@ pub fn encode(frame: &impl Frame, time: Option<Micros>, text: &mut [u8; MAX_STAM
 
 /// Encodes a byte as two hexadecimal digits, both at once: a board encodes thousands of bytes a second.
 #[inline]
-fn hex(byte: u8) -> [u8; 2] {
+pub(crate) fn hex(byte: u8) -> [u8; 2] {
     let digits = u16::from(byte >> 4) | u16::from(byte & 0xF) << 8;
     // One where a digit is above 9: the letters begin 7 behind the character behind '9'.
     let letters = (digits + 0x0606) >> 4 & 0x0101;

@@ -3,6 +3,7 @@
 use super::exchange::Exchange;
 use super::lock::Seed;
 use super::response::{Nrc, Response, decode, nrc, put, put_record};
+use crate::can::slcan::hex;
 use crate::coprocessor::Contradiction;
 use crate::heading::CourseCounters;
 use crate::service::MappedSlots;
@@ -70,25 +71,19 @@ impl<R: NorFlash, W: MappedSlots, E: FnMut() -> Option<Seed>> Exchange<'_, R, W,
             0x0115 => put_record(out, device.learned()),
             0x0116 => {
                 let known = device.forward_deg();
-                let [yaw, sigma] = known.unwrap_or_default().map(|angle| libm::roundf(100.0 * angle) as i16);
                 put(out, &[device.forward_knowledge() as u8])?;
-                put(out, &yaw.to_be_bytes())?;
-                put(out, &sigma.to_be_bytes())
+                put_codes(out, known.unwrap_or_default().map(|angle| 100.0 * angle))
             }
             0x0118 => {
                 let (knowledge, angles) = device.level_deg();
                 put(out, &[knowledge as u8])?;
-                angles
-                    .into_iter()
-                    .try_for_each(|angle| put(out, &(libm::roundf(100.0 * angle) as i16).to_be_bytes()))
+                put_codes(out, angles.map(|angle| 100.0 * angle))
             }
             0x0119 => {
                 let (course, knowledge) = device.course();
                 let codes = course.gain.map_or([0.0, 0.0], |gain| [gain.share, gain.sigma]);
                 put(out, &[knowledge as u8])?;
-                codes
-                    .iter()
-                    .try_for_each(|share| put(out, &(libm::roundf(1e5 * share) as i16).to_be_bytes()))?;
+                put_codes(out, codes.map(|share| 1e5 * share))?;
                 let CourseCounters { used, refused, restarts } = course.counters;
                 put_words(out, &[used, refused, restarts])?;
                 put(out, &[course.refusal.map_or(0, |refusal| refusal as u8)])
@@ -156,9 +151,9 @@ pub(super) fn is_writable(id: u16) -> bool {
     matches!(id, 0x0100 | 0x0101 | 0x010D | 0x0110 | UPDATE | RETIRED_FIRST..=RETIRED_LAST)
 }
 
-fn hex(byte: u8) -> [u8; 2] {
-    let digit = |value: u8| if value < 10 { b'0' + value } else { b'A' - 10 + value };
-    [digit(byte >> 4), digit(byte & 0xF)]
+/// Writes values as whole numbers of 16 bits.
+fn put_codes<const N: usize>(out: &mut Response, values: [f32; N]) -> Result<(), Nrc> {
+    values.into_iter().try_for_each(|value| put(out, &(libm::roundf(value) as i16).to_be_bytes()))
 }
 
 fn put_words(out: &mut Response, words: &[u32]) -> Result<(), Nrc> {
