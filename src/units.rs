@@ -1,6 +1,8 @@
 //! The fixed-point quantities of the integer pipeline: all between the sensor parser and the CAN payload is integer
 //! arithmetic, so that every machine computes the same bits.
 
+use serde::{Deserialize, Serialize};
+
 /// Rate of the common grid that the networks see, Hz.
 pub const RATE_HZ: u32 = 100;
 
@@ -36,9 +38,7 @@ pub enum RangeError {
 }
 
 /// Holds an angular rate, signed 32 bit, LSB 2^-27 rad/s (4.3e-7 deg/s), range +-16 rad/s (+-916 deg/s).
-#[derive(
-    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, serde::Serialize, serde::Deserialize,
-)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct AngularRate(pub i32);
 
@@ -68,9 +68,7 @@ impl AngularRate {
 }
 
 /// Holds a specific force, signed 32 bit, LSB 2^-20 m/s^2, range +-2048 m/s^2.
-#[derive(
-    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, serde::Serialize, serde::Deserialize,
-)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SpecificForce(pub i32);
 
@@ -140,9 +138,7 @@ impl Yaw {
 }
 
 /// Holds the speed of a wheel over ground, signed 32 bit, LSB 2^-16 m/s, range +-32768 m/s.
-#[derive(
-    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, serde::Serialize, serde::Deserialize,
-)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct WheelSpeed(pub i32);
 
@@ -157,7 +153,7 @@ impl WheelSpeed {
 }
 
 /// Holds a temperature of the part, in 1/100 deg C.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct CentiCelsius(pub i16);
 
@@ -180,9 +176,7 @@ impl Micros {
 }
 
 /// Holds a duration in microseconds.
-#[derive(
-    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, serde::Serialize, serde::Deserialize,
-)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Duration(pub u64);
 
