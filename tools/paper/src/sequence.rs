@@ -26,7 +26,7 @@ use gyronet::bias::STATIC_SAMPLES;
 use gyronet::sample::{ImuSample, PERIOD_US, Validity};
 use gyronet::units::{AngularRate, Micros, SpecificForce};
 use gyronet_tools::drive::DT;
-use gyronet_tools::drive::error::{DataError, DataFault};
+use gyronet_tools::drive::error::{DataError, DataFault, named};
 use gyronet_tools::drive::recording::Row as RecordingRow;
 use gyronet_tools::drive::stream::Recording;
 use gyronet_tools::drive::vehicle::Vehicle;
@@ -114,7 +114,7 @@ pub fn find(folder: &Path) -> Result<Vec<PathBuf>, DataError> {
     if is_sequence(folder) {
         return Ok(vec![folder.to_owned()]);
     }
-    let entries = fs::read_dir(folder).map_err(|source| DataError::of(folder.display(), source.into()))?;
+    let entries = fs::read_dir(folder).map_err(named(folder))?;
     let mut found: Vec<PathBuf> =
         entries.filter_map(|entry| entry.ok().map(|e| e.path())).filter(|path| is_sequence(path)).collect();
     found.sort();

@@ -3,10 +3,9 @@
 //! quaternion. Rows that begin with # are comments.
 
 use super::sequence::{columns, yaw};
-use gyronet_tools::drive::error::{DataError, DataFault, ValueError};
+use gyronet_tools::drive::error::{DataError, DataFault, ValueError, read_text};
 use gyronet_tools::evaluate::angle::wrap;
 use gyronet_tools::evaluate::trajectory_error::Point;
-use std::fs;
 use std::path::Path;
 
 const COLUMNS: [&str; 8] = ["time", "x", "y", "z", "qx", "qy", "qz", "qw"];
@@ -35,9 +34,7 @@ pub struct Trajectory {
 
 impl Trajectory {
     pub fn read(path: &Path) -> Result<Self, DataError> {
-        let name = path.display().to_string();
-        let text = fs::read_to_string(path).map_err(|source| DataError::open(&name, source))?;
-        Self::parse(name, &text)
+        Self::parse(path.display().to_string(), &read_text(path)?)
     }
 
     pub fn parse(path: String, text: &str) -> Result<Self, DataError> {

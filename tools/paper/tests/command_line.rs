@@ -51,7 +51,7 @@ fn tables_fit_to_training_sequences_and_take_other_methods() {
     assert_eq!(output.status.code(), Some(0), "{errors}");
     assert!(tables.contains("FoG and wheels are fitted on one: "), "{tables}");
     assert!(tables.contains("mine: 1 of 1 sequences left out\n    "), "{tables}");
-    assert!(tables.contains("one.txt: missing"), "{tables}");
+    assert!(tables.contains("one.txt: No such file"), "{tables}");
     let twice = paper(&["tables", &sequence, "--method", &mine, "--method", &mine]);
     assert_eq!(twice.status.code(), Some(1));
     assert!(text(&twice.stderr).contains("given twice"), "{}", text(&twice.stderr));

@@ -41,11 +41,6 @@ impl DataError {
         let fault = DataFault::Value { text: text.to_owned(), error };
         Self { column: Some(column.to_string()), ..Self::at(path, line, fault) }
     }
-
-    pub fn open(path: impl fmt::Display, source: std::io::Error) -> Self {
-        let missing = source.kind() == std::io::ErrorKind::NotFound;
-        Self::of(path, if missing { DataFault::Missing } else { DataFault::Io(source) })
-    }
 }
 
 impl std::error::Error for DataError {}
@@ -82,8 +77,6 @@ pub enum DataFault {
     Io(#[from] std::io::Error),
     #[error(transparent)]
     Csv(#[from] csv::Error),
-    #[error("missing")]
-    Missing,
     #[error("holds no samples")]
     Empty,
     #[error("column {0} is missing (a table of another tool becomes a drive by `gyronet import`)")]

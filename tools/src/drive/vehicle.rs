@@ -12,7 +12,7 @@
 //! start = 1700000000.25    # time of day of the first row, s since 1970
 //! ```
 
-use super::error::{DataError, DataFault};
+use super::error::{DataError, DataFault, read_text};
 use gyronet::mounting::Rotation;
 use serde::Deserialize;
 use serde::de::IgnoredAny;
@@ -81,8 +81,7 @@ pub struct Wheels {
 impl Vehicle {
     pub fn read(path: &Path) -> Result<Self, DataError> {
         let name = path.display().to_string();
-        let text = std::fs::read_to_string(path).map_err(|source| DataError::open(&name, source))?;
-        let mut vehicle = Self::parse(&name, &text)?;
+        let mut vehicle = Self::parse(&name, &read_text(path)?)?;
         vehicle.path = Some(path.to_owned());
         Ok(vehicle)
     }

@@ -1,6 +1,6 @@
 //! `gyronet-paper tables` computes the paper's tables on given sequences.
 
-use super::{print_json, remark};
+use super::{named, print_json, remark};
 use gyronet::model::fognet::FogNetState;
 use gyronet::model::weights::{FOGNET, GYRONET};
 use gyronet::model::{FogNet, GyroNet};
@@ -9,7 +9,6 @@ use gyronet_paper::tables::given::Given;
 use gyronet_paper::tables::joint::{Fit, Joint};
 use gyronet_paper::tables::results::{Results, SequenceErrors};
 use gyronet_paper::tables::{estimates, table};
-use gyronet_tools::drive::error::DataError;
 use gyronet_tools::network::weight_file::WeightFile;
 use std::fs;
 use std::io::Write;
@@ -75,7 +74,7 @@ pub fn run(args: &Args, json: bool) -> super::Result {
             return Err(format!("--method {}: this name is given twice", given.method.name).into());
         }
         // A trajectory that is missing from the folder is not an error; a missing folder is.
-        fs::read_dir(&given.folder).map_err(|source| DataError::open(given.folder.display(), source))?;
+        fs::read_dir(&given.folder).map_err(named(&given.folder))?;
     }
     let weights = match &args.weights {
         Some(path) => WeightFile::read(path)?,

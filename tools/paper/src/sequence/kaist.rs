@@ -8,7 +8,7 @@ use super::Files;
 use super::rows::{Format, Rows};
 use super::summary::seconds;
 use super::track::{Track, Unwrap};
-use gyronet_tools::drive::error::DataError;
+use gyronet_tools::drive::error::{DataError, read_text};
 use std::f64::consts::PI;
 use std::path::Path;
 
@@ -76,7 +76,7 @@ struct EncoderParameters {
 impl EncoderParameters {
     fn read(path: &Path) -> Result<Self, DataError> {
         let name = path.display().to_string();
-        let text = std::fs::read_to_string(path).map_err(|source| DataError::open(&name, source))?;
+        let text = read_text(path)?;
         // The second word of a line is the key, as in the data set's own readers.
         let number = |parameter: &'static str, key: &str| {
             let line = text.lines().find(|line| line.split_whitespace().nth(1) == Some(key));

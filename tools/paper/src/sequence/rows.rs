@@ -2,7 +2,7 @@
 
 use super::summary::{StreamSummary, seconds};
 use csv::ByteRecord;
-use gyronet_tools::drive::error::{DataError, DataFault, ValueError};
+use gyronet_tools::drive::error::{DataError, DataFault, ValueError, named};
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::Path;
@@ -45,8 +45,8 @@ pub(super) struct Rows {
 impl Rows {
     pub fn open(path: &Path, format: Format) -> Result<Self, DataError> {
         let name = path.display().to_string();
-        let cut_at = File::open(path).and_then(cut).map_err(|source| DataError::open(&name, source))?;
-        let file = File::open(path).map_err(|source| DataError::open(&name, source))?;
+        let cut_at = File::open(path).and_then(cut).map_err(named(path))?;
+        let file = File::open(path).map_err(named(path))?;
         let csv = csv::ReaderBuilder::new()
             .has_headers(false)
             .flexible(true)
