@@ -144,10 +144,10 @@ impl Sequence {
             let reason = format!("its files have {seconds:.2} s in common, needed are {NEEDED} s");
             return Err(DataError::because(folder.display(), reason));
         }
-        let [x, y] = steps.first().map_or([0.0; 2], |step: &Step| step.position);
-        let latitude = utm::latitude_deg([x, y]);
+        let origin = steps.first().map_or([0.0; 2], |step: &Step| step.position);
+        let latitude = utm::latitude_deg(origin);
         for step in &mut steps {
-            step.position = [step.position[0] - x, step.position[1] - y];
+            step.position = [step.position[0] - origin[0], step.position[1] - origin[1]];
         }
         let (wheel_base, start_s) = (files.wheel_base, files.epoch_s + begin);
         let Files { imu, fog, wheels, truth, .. } = files;
@@ -156,18 +156,7 @@ impl Sequence {
         let name = folder.canonicalize().ok().and_then(|path| Some(path.file_name()?.to_str()?.to_owned()));
         let name = name.unwrap_or_else(|| folder.display().to_string());
         let path = folder.to_owned();
-        Ok(Self {
-            name,
-            path,
-            simulated,
-            wheel_base,
-            latitude,
-            start_s,
-            origin: [x, y],
-            steps,
-            in_gap,
-            files,
-        })
+        Ok(Self { name, path, simulated, wheel_base, latitude, start_s, origin, steps, in_gap, files })
     }
 
     pub fn seconds(&self) -> f64 {
