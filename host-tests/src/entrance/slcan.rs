@@ -7,7 +7,6 @@ use gyronet::can::slcan::{emit, parse, parse_stamped};
 use gyronet::units::Micros;
 use gyronet_tools::client::bus::{Bus, Line, SlcanBus};
 use std::io::{Read, Result, Write};
-use std::time::Duration;
 
 const ANSWERS: [&[u8]; 3] = [b"", b"V0101", b"NGYRO"];
 
@@ -65,11 +64,7 @@ impl Write for Bytes<'_> {
     }
 }
 
-impl Line for Bytes<'_> {
-    fn now(&mut self) -> Duration {
-        Duration::ZERO
-    }
-}
+impl Line for Bytes<'_> {}
 
 /// Passes bytes to a host as from a serial line. A parsed frame must survive emitting and parsing.
 pub fn host(data: &[u8]) {

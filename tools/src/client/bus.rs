@@ -7,7 +7,8 @@ mod socketcan;
 use super::connection::ConnectError;
 use gyronet::can::DataFrame;
 use std::io::Result;
-use std::time::Duration;
+use std::sync::LazyLock;
+use std::time::{Duration, Instant};
 
 pub use slcan::{Line, SlcanBus};
 
@@ -23,7 +24,15 @@ pub trait Bus {
     fn receive(&mut self) -> Result<Vec<DataFrame>>;
 
     /// Returns the time since an arbitrary but fixed moment.
-    fn now(&mut self) -> Duration;
+    fn now(&mut self) -> Duration {
+        computer_time()
+    }
+}
+
+/// Returns the time since the first call.
+fn computer_time() -> Duration {
+    static START: LazyLock<Instant> = LazyLock::new(Instant::now);
+    START.elapsed()
 }
 
 impl<B: Bus + ?Sized> Bus for Box<B> {

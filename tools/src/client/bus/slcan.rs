@@ -1,11 +1,10 @@
 //! An SLCAN line carries frames as text over any byte stream.
 
-use super::{Bus, WAIT};
+use super::{Bus, WAIT, computer_time};
 use crate::client::connection::{self, ConnectError, Connection, is_silence};
 use gyronet::can::{DataFrame, slcan};
 use std::io::{ErrorKind, Read, Result, Write};
-use std::sync::LazyLock;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// The answer to a refused command; no line end follows.
 const BELL: u8 = 7;
@@ -15,15 +14,12 @@ const LONGEST: usize = 64;
 /// A byte stream whose reads return after a short time with the bytes that have arrived.
 pub trait Line: Read + Write {
     /// Returns the time since an arbitrary but fixed moment.
-    fn now(&mut self) -> Duration;
-}
-
-impl Line for Connection {
     fn now(&mut self) -> Duration {
-        static START: LazyLock<Instant> = LazyLock::new(Instant::now);
-        START.elapsed()
+        computer_time()
     }
 }
+
+impl Line for Connection {}
 
 pub struct SlcanBus<L> {
     line: L,
@@ -105,11 +101,7 @@ mod tests {
         }
     }
 
-    impl Line for Script {
-        fn now(&mut self) -> Duration {
-            Duration::ZERO
-        }
-    }
+    impl Line for Script {}
 
     #[test]
     fn frames_are_read_between_answers() {

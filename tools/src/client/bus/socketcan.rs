@@ -6,12 +6,8 @@ use embedded_can::Frame;
 use gyronet::can::DataFrame;
 use socketcan::{CanFrame, CanSocket, Socket, SocketOptions};
 use std::io::{ErrorKind, Result};
-use std::time::{Duration, Instant};
 
-pub struct Interface {
-    socket: CanSocket,
-    opened: Instant,
-}
+pub struct Interface(CanSocket);
 
 impl Interface {
     pub fn open(name: &str) -> std::result::Result<Self, ConnectError> {
@@ -19,7 +15,7 @@ impl Interface {
             let socket = CanSocket::open(name)?;
             socket.set_read_timeout(WAIT)?;
             socket.set_error_filter_drop_all()?;
-            Ok(Self { socket, opened: Instant::now() })
+            Ok(Self(socket))
         };
         open().map_err(|source| ConnectError::Interface { name: name.to_owned(), source })
     }
@@ -28,21 +24,17 @@ impl Interface {
 impl Bus for Interface {
     fn send(&mut self, frame: &DataFrame) -> Result<()> {
         let frame = CanFrame::new(frame.id(), frame.data()).ok_or(ErrorKind::InvalidInput)?;
-        self.socket.write_frame(&frame)
+        self.0.write_frame(&frame)
     }
 
     fn receive(&mut self) -> Result<Vec<DataFrame>> {
-        match self.socket.read_frame() {
+        match self.0.read_frame() {
             Ok(frame) => Ok(DataFrame::new(frame.id(), frame.data()).into_iter().collect()),
             Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {
                 Ok(Vec::new())
             }
             Err(error) => Err(error),
         }
-    }
-
-    fn now(&mut self) -> Duration {
-        self.opened.elapsed()
     }
 }
 
