@@ -15,6 +15,7 @@ use gyronet::units::Micros;
 use gyronet_tools::bundled;
 use gyronet_tools::drive::DT;
 use gyronet_tools::drive::candump::Log;
+use gyronet_tools::drive::error::named;
 use gyronet_tools::drive::recording::Row;
 use gyronet_tools::drive::stream::Recording;
 use gyronet_tools::drive::wheel_frames::WheelFrames;
@@ -22,7 +23,7 @@ use std::error::Error;
 use std::fs::File;
 use std::io::{self, ErrorKind, LineWriter, Read, Write};
 use std::net::{Ipv4Addr, TcpListener, TcpStream};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
@@ -130,11 +131,10 @@ fn run(args: &Args) -> Result<(), Box<dyn Error>> {
         (SLCAN, Socket::open("SLCAN (USART2)", args.slcan)?),
     ];
     let mut adapter = Adapter::open(args.can)?;
-    let log = args
-        .log
-        .as_ref()
-        .map(|path| File::create(path).map_err(|error| format!("{}: {error}", path.display())));
-    let mut log = log.transpose()?.map(|file| Log::new(LineWriter::new(file)));
+    let mut log = match &args.log {
+        Some(path) => Some((path, Log::new(LineWriter::new(File::create(path).map_err(named(path))?)))),
+        None => None,
+    };
     let (mut vehicle, began) = (Vehicle::new(drive), Instant::now());
     let (mut due, mut report, mut sent_at) = (began, REPORT, Some(Duration::ZERO));
     for turn in (0..TURNS).cycle() {
@@ -166,11 +166,8 @@ fn run(args: &Args) -> Result<(), Box<dyn Error>> {
             if own {
                 sent_at = Some(end);
             }
-            if let Some(log) = &mut log {
-                let written = log.frame(Micros(end.as_micros() as u64), &frame);
-                written.map_err(|error| {
-                    format!("{}: {error}", args.log.as_deref().unwrap_or(Path::new("")).display())
-                })?;
+            if let Some((path, log)) = &mut log {
+                log.frame(Micros(end.as_micros() as u64), &frame).map_err(named(path))?;
             }
             adapter.seen(end, &frame);
         }
