@@ -2,12 +2,12 @@
 //! car's own speed, and the heading of a survey-grade system as reference.
 
 use gyronet::bias::Latitude;
-use gyronet::coprocessor::{Config, Coprocessor, Sink, TimedFrame};
-use gyronet::estimate::YawEstimate;
+use gyronet::coprocessor::{Config, Coprocessor};
 use gyronet::fog::{FogConfig, FogErrors};
 use gyronet::sample::FogSample;
 use gyronet::units::{Angle, Micros};
 use gyronet_host_tests::recordings;
+use gyronet_host_tests::sent::Sent;
 use gyronet_paper::simulate::world::EARTH_RATE;
 use gyronet_tools::drive::wheel_frames;
 use std::path::Path;
@@ -39,19 +39,6 @@ fn at(table: &[Vec<f64>], column: usize, time: f64) -> f64 {
     before[column] + share * (after[column] - before[column])
 }
 
-/// The sum of the rates that are sent, rad.
-struct Turned(f64);
-
-impl Sink for Turned {
-    const TAKES_FRAMES: bool = false;
-
-    fn frame(&mut self, _frame: TimedFrame) {}
-
-    fn fog_rate(&mut self, rate: &YawEstimate) {
-        self.0 += 0.01 * rate.rate.rad_per_sec();
-    }
-}
-
 /// Yaw by the board after each row of the gyro, rad.
 fn yaw(gyro: &[Vec<f64>], speed: &[Vec<f64>], latitude: f64) -> Vec<f64> {
     let latitude = Latitude::from_degrees(latitude as f32);
@@ -61,7 +48,7 @@ fn yaw(gyro: &[Vec<f64>], speed: &[Vec<f64>], latitude: f64) -> Vec<f64> {
         ..Config::DEFAULT
     });
     let mut yaw = vec![0.0; gyro.len()];
-    let mut turned = Turned(0.0);
+    let (mut turned, mut sent) = (0.0, Sent::default());
     for (row, place) in gyro.iter().zip(&mut yaw) {
         for step in 0..STEPS {
             // The unit gives one reading in 100 ms; a gyro whose increments are equal would be stuck.
@@ -78,9 +65,11 @@ fn yaw(gyro: &[Vec<f64>], speed: &[Vec<f64>], latitude: f64) -> Vec<f64> {
             let turn = Angle(((0.01 * row[6] + flicker) * f64::from(Angle::PER_RAD)).round() as i64);
             let increment = [None, None, Some(turn)];
             let sample = FogSample { time: now, span: 10_000, lost: 0, increment, temperature: None };
-            coprocessor.fog(sample, now, &mut turned).expect("in order");
+            coprocessor.fog(sample, now, &mut sent).expect("in order");
         }
-        *place = turned.0;
+        turned += sent.fog.drain(..).map(|rate| 0.01 * rate.rate.rad_per_sec()).sum::<f64>();
+        sent.frames.clear();
+        *place = turned;
     }
     yaw
 }

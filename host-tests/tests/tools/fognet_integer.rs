@@ -45,7 +45,7 @@ fn bent(integer: &mut FogNet<'_, '_>, float: &mut FogNetF32<'_>, window: &Window
         .map(|estimate| estimate.correction.rad() - estimate.linear.rad())
 }
 
-fn rms(values: impl Iterator<Item = f64> + Clone) -> f64 {
+pub fn rms(values: impl Iterator<Item = f64> + Clone) -> f64 {
     (values.clone().map(|value| value * value).sum::<f64>() / values.count() as f64).sqrt()
 }
 

@@ -1,6 +1,7 @@
 //! The trainer's Python and this library make the same of the same files: the seconds and the windows of FoGNet (Fig. 8),
 //! its losses (Eq. 14 to 16), and the windows of GyroNet. Python needs numpy alone.
 
+use crate::fognet_integer::rms;
 use gyronet::fog::FogConfig;
 use gyronet::model::fognet::{FogEstimate, MinuteNetwork};
 use gyronet::model::seconds::{FRAMES, STEPS, Second, SecondsWindow};
@@ -116,11 +117,6 @@ fn features(sample: &gyronet::sample::ImuSample) -> [f64; 6] {
     let [fx, fy, fz] = sample.specific_force.map(SpecificForce::metre_per_sec2);
     let [wx, wy, wz] = sample.angular_rate.map(AngularRate::rad_per_sec);
     [fx, fy, fz, wx, wy, wz]
-}
-
-fn rms(values: impl Iterator<Item = f64>) -> f64 {
-    let squares: Vec<f64> = values.map(|value| value * value).collect();
-    (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
 }
 
 fn compare(ours: &[[f64; FEATURES]], theirs: &[[f64; FEATURES]], most: [f64; FEATURES], end: usize) {
