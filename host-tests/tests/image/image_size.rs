@@ -31,12 +31,13 @@ fn no_panic_in_the_image() {
 
 #[test]
 fn budgets_hold() {
-    let Some(path) = image::firmware(env!("CARGO_TARGET_TMPDIR"), "coprocessor") else { return };
-    let stack = ImageStack::read(&std::fs::read(&path).expect("just built")).expect("a bound");
+    let Some(image) = elf("coprocessor") else { return };
+    let stack = ImageStack::read(&image).expect("a bound");
     println!("{stack:?}");
     assert!(stack.deepest.iter().any(|(name, _)| name.contains("main")), "{:?}", stack.deepest);
-    let size = ImageSize::read(&std::fs::read(&path).expect("an image")).expect("sizes");
+    let size = ImageSize::read(&image).expect("sizes");
     println!("{size:?}");
+    assert!(size.kernels > 0 && size.kernels <= 8 * 1024, "{size:?}");
     let measured = [size.flash, size.static_ram, stack.worst().into()];
     assert!(measured.iter().zip(BUDGETS).all(|(bytes, budget)| *bytes <= budget), "{measured:?} {stack:?}");
 }

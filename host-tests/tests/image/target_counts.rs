@@ -45,14 +45,6 @@ fn kernels_cost_no_more_than_their_bars() {
     assert!(stack <= 1_280, "{stack} bytes of stack for a window");
 }
 
-#[test]
-fn kernels_fit_in_8_kib() {
-    let Some(elf) = image::firmware(env!("CARGO_TARGET_TMPDIR"), "coprocessor") else { return };
-    let size = ImageSize::read(&std::fs::read(&elf).expect("an image")).expect("an ELF file");
-    println!("{size:?}");
-    assert!(size.kernels > 0 && size.kernels <= 8 * 1024, "{size:?}");
-}
-
 /// The kernels on the targets, the Cortex-M4 and the NUCLEO-H563ZI's Cortex-M33, equal their portable definition, and
 /// the outputs of GyroNet and FoGNet there equal this host's.
 #[test]
