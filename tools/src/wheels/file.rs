@@ -30,7 +30,7 @@ pub enum WheelFileError {
     #[error("frame {id:#x}: {source}")]
     Place { id: u32, source: OutsideFrame },
     #[error("{key} = {value}: must be {range}")]
-    Range { key: &'static str, value: f64, range: &'static str },
+    Range { key: &'static str, value: f64, range: String },
     #[error(transparent)]
     Settings(#[from] WheelConfigError),
 }
@@ -147,7 +147,7 @@ pub struct Counter {
 #[serde(deny_unknown_fields)]
 pub struct Says {
     pub start_bit: u8,
-    #[serde(default = "one_bit")]
+    #[serde(default = "one")]
     pub bits: u8,
     #[serde(default)]
     pub order: Order,
@@ -155,12 +155,8 @@ pub struct Says {
     pub value: u32,
 }
 
-const fn one_bit() -> u8 {
-    1
-}
-
-const fn one() -> u32 {
-    1
+fn one<N: From<u8>>() -> N {
+    1.into()
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -231,9 +227,8 @@ impl WheelFile {
     /// Reads a file with its settings; an error names the file.
     pub fn read(path: &Path) -> Result<(Self, WheelSettings), DataError> {
         let text = read_text(path)?;
-        let read = Self::parse(&text).and_then(|file| Ok((file.settings()?, file)));
-        read.map(|(settings, file)| (file, settings))
-            .map_err(|error| DataError::because(path.display(), error))
+        let read = Self::parse(&text).and_then(|file| file.settings().map(|settings| (file, settings)));
+        read.map_err(|error| DataError::because(path.display(), error))
     }
 
     pub fn parse(text: &str) -> Result<Self, WheelFileError> {
@@ -352,25 +347,24 @@ signal = [
         let codes = TOYOTA.replacen("0xFFFE", "1, 2, 3", 1);
         assert!(error(&codes).ends_with("invalid = 4: must be at most three codes"));
         assert!(error("frame = 1").starts_with("TOML parse error at line 1"));
-        assert!(error(&TOYOTA.replace("start_bit = 23", "start_bit = 15")).ends_with("two values overlap"));
-        assert!(
-            error(&TOYOTA.replace("start_bit = 55", "start_bit = 63")).contains("do not lie inside a frame")
-        );
-        assert!(
-            error(&TOYOTA.replace("0xAA", "0x800")).ends_with("frame 0x800: not an identifier of 11 bits")
-        );
-        assert!(
-            error(&TOYOTA.replace("\"rear-left\"", "\"rear-right\"")).ends_with("RearRight has two signals")
-        );
-        assert!(
-            error(&TOYOTA.replace("0.01", "0.0")).contains("factor_kmh = 0: must be below 100 and not 0")
-        );
-        assert!(error(&TOYOTA.replace("[[frame]]", "still_for_ms = 0\n[[frame]]")).contains("wheel times"));
-        let checksum = |kind: &str| {
-            TOYOTA.replace("id = 0xAA", &format!("id = 0xAA\nchecksum = {{ kind = \"{kind}\", byte = 7 }}"))
-        };
-        assert!(error(&checksum("crc99")).contains("unknown variant `crc99`"));
-        // Byte 7 is part of the last signal.
-        assert!(error(&checksum("xor")).ends_with("two values overlap"));
+        for (from, to, said) in [
+            ("start_bit = 23", "start_bit = 15", "two values overlap"),
+            ("start_bit = 55", "start_bit = 63", "do not lie inside a frame"),
+            ("0xAA", "0x800", "frame 0x800: not an identifier of 11 bits"),
+            ("\"rear-left\"", "\"rear-right\"", "RearRight has two signals"),
+            ("0.01", "0.0", "factor_kmh = 0: must be below 100 and not 0"),
+            (
+                "factor_kmh = 0.01",
+                "metres_per_pulse = 0.5",
+                "metres_per_pulse = 0.5: must be below 0.5 and not 0",
+            ),
+            ("[[frame]]", "still_for_ms = 0\n[[frame]]", "wheel times"),
+            ("0xAA", "0xAA\nchecksum = { kind = \"crc99\", byte = 7 }", "unknown variant `crc99`"),
+            // Byte 7 is part of the last signal.
+            ("0xAA", "0xAA\nchecksum = { kind = \"xor\", byte = 7 }", "two values overlap"),
+        ] {
+            let error = error(&TOYOTA.replace(from, to));
+            assert!(error.contains(said), "{error}");
+        }
     }
 }

@@ -62,8 +62,8 @@ impl Signal {
     pub(super) fn settings(&self, id: u32, frame: u8) -> Result<WheelSignal, WheelFileError> {
         let place = |source| WheelFileError::Place { id, source };
         let (pulses, factor_q16) = match (self.factor_kmh, self.metres_per_pulse) {
-            (Some(kmh), None) => (false, factor(kmh)?),
-            (None, Some(metres)) => (true, pulse(metres)?),
+            (Some(kmh), None) => (false, factor("factor_kmh", kmh, FACTORS_PER_KMH, 100.0)?),
+            (None, Some(metres)) => (true, factor("metres_per_pulse", metres, FACTORS_PER_METRE, 0.5)?),
             _ => return Err(WheelFileError::Scale(self.wheel)),
         };
         let codes = match &self.invalid {
@@ -74,7 +74,8 @@ impl Signal {
         let mut invalid = [None; 3];
         if codes.len() > invalid.len() {
             let value = codes.len() as f64;
-            return Err(WheelFileError::Range { key: "invalid", value, range: "at most three codes" });
+            let range = "at most three codes".into();
+            return Err(WheelFileError::Range { key: "invalid", value, range });
         }
         invalid.iter_mut().zip(codes).for_each(|(to, code)| *to = Some(*code));
         let limit = |kmh| speed("range_kmh", kmh);
@@ -110,19 +111,11 @@ impl Signal {
     }
 }
 
-/// Converts a factor to the library's code. It must be below 100 km/h, and its code must not be zero.
-fn factor(kmh: f64) -> Result<i32, WheelFileError> {
-    let code = (kmh * FACTORS_PER_KMH).round() as i32;
-    let error = WheelFileError::Range { key: "factor_kmh", value: kmh, range: "below 100 and not 0" };
-    if kmh.abs() < 100.0 && code != 0 { Ok(code) } else { Err(error) }
-}
-
-/// Converts the way of a pulse, below 0.5 m, to the library's code.
-fn pulse(metres: f64) -> Result<i32, WheelFileError> {
-    let code = (metres * FACTORS_PER_METRE).round() as i32;
-    let error =
-        WheelFileError::Range { key: "metres_per_pulse", value: metres, range: "below 0.5 and not 0" };
-    if metres.abs() < 0.5 && code != 0 { Ok(code) } else { Err(error) }
+/// Converts a factor to the library's code, which must not be zero; an error names the key and the range.
+fn factor(key: &'static str, value: f64, per_unit: f64, most: f64) -> Result<i32, WheelFileError> {
+    let code = (value * per_unit).round() as i32;
+    let range = format!("below {most} and not 0");
+    if value.abs() < most && code != 0 { Ok(code) } else { Err(WheelFileError::Range { key, value, range }) }
 }
 
 pub(super) fn kmh(speed: WheelSpeed) -> f64 {
@@ -143,5 +136,5 @@ pub(super) fn speed(key: &'static str, kmh: f64) -> Result<WheelSpeed, WheelFile
     if kmh.abs() < 1e4 {
         return Ok(WheelSpeed((kmh * CODES_PER_KMH).round() as i32));
     }
-    Err(WheelFileError::Range { key, value: kmh, range: "within 10000" })
+    Err(WheelFileError::Range { key, value: kmh, range: "within 10000".into() })
 }
