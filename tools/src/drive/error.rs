@@ -5,7 +5,8 @@ use gyronet::bias::StaticError;
 use std::fmt;
 use std::path::Path;
 
-#[derive(Debug)]
+#[derive(Debug, thiserror::Error)]
+#[error("{path}: {}{fault}", self.place())]
 pub struct DataError {
     pub path: String,
     pub line: Option<u64>,
@@ -41,9 +42,15 @@ impl DataError {
         let fault = DataFault::Value { text: text.to_owned(), error };
         Self { column: Some(column.to_string()), ..Self::at(path, line, fault) }
     }
-}
 
-impl std::error::Error for DataError {}
+    fn place(&self) -> String {
+        match (self.line, &self.column) {
+            (Some(line), Some(column)) => format!("line {line}, column {column}: "),
+            (Some(line), None) => format!("line {line}: "),
+            (None, _) => String::new(),
+        }
+    }
+}
 
 /// Returns what names a file in an error of reading or writing it.
 pub fn named(path: &Path) -> impl Fn(std::io::Error) -> DataError {
@@ -56,18 +63,6 @@ pub fn read(path: &Path) -> Result<Vec<u8>, DataError> {
 
 pub fn read_text(path: &Path) -> Result<String, DataError> {
     std::fs::read_to_string(path).map_err(named(path))
-}
-
-impl fmt::Display for DataError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: ", self.path)?;
-        match (self.line, &self.column) {
-            (Some(line), Some(column)) => write!(f, "line {line}, column {column}: ")?,
-            (Some(line), None) => write!(f, "line {line}: ")?,
-            (None, _) => {}
-        }
-        self.fault.fmt(f)
-    }
 }
 
 #[derive(Debug, thiserror::Error)]

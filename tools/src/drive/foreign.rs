@@ -1,6 +1,6 @@
 //! Logs of other tools, recognised by their first bytes.
 
-use super::error::{DataError, DataFault};
+use super::error::{DataError, DataFault, named};
 use super::word;
 use std::fs::File;
 use std::io::{Read, Seek};
@@ -28,18 +28,17 @@ const FORMATS: [(&[u8], &str); 17] = [
 
 /// Opens a drive for reading; a log or a folder is refused with the command that imports it.
 pub fn open(path: &Path) -> Result<File, DataError> {
-    let shown = path.display().to_string();
-    let failed = |source: std::io::Error| DataError::of(&shown, source.into());
-    let mut file = File::open(path).map_err(failed)?;
-    let kind = file.metadata().map_err(failed)?.file_type();
+    let failed = named(path);
+    let mut file = File::open(path).map_err(&failed)?;
+    let kind = file.metadata().map_err(&failed)?.file_type();
     if kind.is_dir() {
         return Err(refused(path, "a folder"));
     }
     // A pipe cannot be read twice.
     if kind.is_file() {
         let mut first = Vec::new();
-        file.by_ref().take(32).read_to_end(&mut first).map_err(failed)?;
-        file.rewind().map_err(failed)?;
+        file.by_ref().take(32).read_to_end(&mut first).map_err(&failed)?;
+        file.rewind().map_err(&failed)?;
         if let Some((_, format)) = FORMATS.iter().find(|(begins, _)| first.starts_with(begins)) {
             return Err(refused(path, format));
         }
