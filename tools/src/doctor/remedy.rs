@@ -10,9 +10,9 @@ use std::path::Path;
 /// forward from x after levelling.
 pub fn mounting(rows: &Rows, level: &Mounting, left_deg: f64) -> String {
     let Vehicle { mounting, recording, path, .. } = &rows.vehicle;
-    let level = turn(level.roll_deg, level.pitch_deg, 0.0);
+    let level = vehicle::Mounting::of([level.roll_deg, level.pitch_deg, 0.0]);
     let vehicle::Mounting { roll_deg, pitch_deg, yaw_deg, .. } =
-        mounting.then(&level).then(&turn(0.0, 0.0, -left_deg));
+        mounting.then(&level).then(&vehicle::Mounting::of([0.0, 0.0, -left_deg]));
     let default = Path::new(&rows.name).with_extension("toml");
     let file = path.as_deref().unwrap_or(&default).file_name().unwrap_or_default().display();
     let applied = if mounting.applied { ", applied = false" } else { "" };
@@ -20,15 +20,11 @@ pub fn mounting(rows: &Rows, level: &Mounting, left_deg: f64) -> String {
         "in {file}, under [mounting], set roll_deg = {roll_deg:.1}, pitch_deg = {pitch_deg:.1}, yaw_deg = {yaw_deg:.1}{applied}"
     );
     let vehicle::Mounting { roll_deg, pitch_deg, yaw_deg, .. } =
-        recording.mounting.then(&turn(roll_deg, pitch_deg, yaw_deg));
+        recording.mounting.then(&vehicle::Mounting::of([roll_deg, pitch_deg, yaw_deg]));
     if recording.mounting != vehicle::Mounting::default() {
         text += &format!(" (on the board {roll_deg:.1}, {pitch_deg:.1}, {yaw_deg:.1})");
     }
     text
-}
-
-fn turn(roll_deg: f64, pitch_deg: f64, yaw_deg: f64) -> vehicle::Mounting {
-    vehicle::Mounting { roll_deg, pitch_deg, yaw_deg, applied: false }
 }
 
 /// The channel of a role, as the import names it in this drive or in its log.

@@ -80,10 +80,8 @@ pub struct Wheels {
 
 impl Vehicle {
     pub fn read(path: &Path) -> Result<Self, DataError> {
-        let name = path.display().to_string();
-        let mut vehicle = Self::parse(&name, &read_text(path)?)?;
-        vehicle.path = Some(path.to_owned());
-        Ok(vehicle)
+        let vehicle = Self::parse(&path.display().to_string(), &read_text(path)?)?;
+        Ok(Self { path: Some(path.to_owned()), ..vehicle })
     }
 
     pub fn beside(drive: &Path) -> PathBuf {
@@ -124,6 +122,11 @@ impl Vehicle {
 }
 
 impl Mounting {
+    /// The mounting of these angles of roll, pitch and yaw, degrees.
+    pub fn of([roll_deg, pitch_deg, yaw_deg]: [f64; 3]) -> Self {
+        Self { roll_deg, pitch_deg, yaw_deg, applied: false }
+    }
+
     /// Returns the rotation that the rows of a drive still need, as the board computes it; `None` if they need none.
     pub fn rotation(&self) -> Option<Rotation> {
         let [roll, pitch, yaw] = [self.roll_deg, self.pitch_deg, self.yaw_deg].map(|angle| angle as f32);
@@ -145,8 +148,7 @@ impl Mounting {
         } else {
             (0.0, (-m[0][1]).atan2(m[1][1]))
         };
-        let [roll_deg, pitch_deg, yaw_deg] = [roll, (-m[2][0]).atan2(level), yaw].map(f64::to_degrees);
-        Self { roll_deg, pitch_deg, yaw_deg, applied: false }
+        Self::of([roll, (-m[2][0]).atan2(level), yaw].map(f64::to_degrees))
     }
 
     fn matrix(&self) -> [[f64; 3]; 3] {
@@ -167,18 +169,12 @@ mod tests {
 
     #[test]
     fn two_mountings_are_one() {
-        let of = |[roll_deg, pitch_deg, yaw_deg]: [f64; 3]| Mounting {
-            roll_deg,
-            pitch_deg,
-            yaw_deg,
-            applied: false,
-        };
         for (first, second) in [
             ([12.0, -34.0, 56.0], [-170.0, 20.0, 100.0]),
             ([0.0, 90.0, 30.0], [0.0; 3]),
             ([180.0, 0.0, 0.0], [0.0, 0.0, -90.0]),
         ] {
-            let (first, second) = (of(first), of(second));
+            let (first, second) = (Mounting::of(first), Mounting::of(second));
             let both = first.then(&second).rotation().unwrap_or(Rotation::IDENTITY);
             let [first, second] = [first, second].map(|one| one.rotation().unwrap_or(Rotation::IDENTITY));
             for axis in [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] {
