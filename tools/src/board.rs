@@ -81,21 +81,18 @@ impl<N: WindowNetwork> Board<N> {
     pub fn new(config: Config, wheels: Option<WheelFrames>, network: N) -> Self {
         let receiver = wheels.as_ref().map(|_| wheel_frames::receiver());
         let coprocessor = Coprocessor::new(Config { wheels: receiver, clock: Clock::Sensor, ..config });
-        let held = VecDeque::with_capacity(HOLD + 1);
-        let [now, silent_from] = [Micros(0); 2];
-        let [initialised, ended, may_move, takes_course] = [false; 4];
         Self {
             coprocessor,
             wheels,
             network,
             rows: 0,
-            now,
-            silent_from,
-            held,
-            initialised,
-            ended,
-            may_move,
-            takes_course,
+            now: Micros(0),
+            silent_from: Micros(0),
+            held: VecDeque::with_capacity(HOLD + 1),
+            initialised: false,
+            ended: false,
+            may_move: false,
+            takes_course: false,
         }
     }
 

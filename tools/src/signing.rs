@@ -5,9 +5,8 @@
 use crate::drive::error::{DataError, named, read_text};
 use ed25519_dalek::{Signer, SigningKey};
 use gyronet::uds::signature::{self, SEED, SERIAL, SIGNATURE, Statement, TRAILER};
-use std::fmt::Write as _;
 use std::fs::OpenOptions;
-use std::io::Write as _;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// First line of a private key file, and of a public one.
@@ -78,10 +77,7 @@ pub fn read_public(path: &Path) -> Result<[u8; 32], DataError> {
 }
 
 pub fn hex(bytes: &[u8]) -> String {
-    bytes.iter().fold(String::new(), |mut text, byte| {
-        let _ = write!(text, "{byte:02X}");
-        text
-    })
+    bytes.iter().map(|byte| format!("{byte:02X}")).collect()
 }
 
 /// Parses 2 `N` hexadecimal digits as `N` bytes; `None` for any other text.

@@ -163,10 +163,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         Action::Set { settings, file } => settings::set(&mut device, settings, file.as_deref(), common)?,
         Action::Wheels => settings::print_wheels(&mut device, common)?,
         Action::Calibrate { what, file } => calibration::run(&mut device, *what, file.as_deref(), common)?,
-        Action::Counters => {
-            let counters = device.counters()?;
-            print_value(&counters, common)?;
-        }
+        Action::Counters => print_value(&device.counters()?, common)?,
         Action::Weights { file } => weights(&mut device, file, common)?,
         Action::Update { file, downgrade } => update_firmware(&mut device, file, *downgrade, common)?,
         Action::Access => {
@@ -286,9 +283,8 @@ fn weights(device: &mut Board, path: &std::path::Path, common: Common) -> super:
     }
     WeightFile::new(&path.display().to_string(), &file).blob()?;
     let bar = super::progress::bar(common, file.len(), "upload");
-    let uploaded = upload(device, &file, |written| bar.set_position(written as u64))?;
+    let Uploaded { slot, crc } = upload(device, &file, |written| bar.set_position(written as u64))?;
     bar.finish_and_clear();
-    let Uploaded { slot, crc } = uploaded;
     let text = format_args!("slot {slot} holds file {crc:08x}; the board uses it after a restart");
     super::print(common, &serde_json::json!({ "slot": slot, "crc": crc }), text)
 }

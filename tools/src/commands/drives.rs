@@ -5,7 +5,7 @@ use gyronet_tools::evaluate::report::DriveErrors;
 use indicatif::ProgressBar;
 use std::error::Error;
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 type Judged = Result<DriveErrors, Box<dyn Error + Send + Sync>>;
@@ -18,7 +18,7 @@ pub fn errors(
     judge: impl Fn(&Path, &ProgressBar) -> Judged + Sync,
 ) -> Result<Vec<DriveErrors>, Box<dyn Error>> {
     let next = AtomicUsize::new(0);
-    let results: Vec<Mutex<Option<Judged>>> = files.iter().map(|_| Mutex::new(None)).collect();
+    let results: Vec<OnceLock<Judged>> = files.iter().map(|_| OnceLock::new()).collect();
     let bars = progress::bars(common);
     let work = || {
         while let Some((file, result)) =
@@ -32,7 +32,8 @@ pub fn errors(
             if judged.is_err() {
                 next.store(files.len(), Ordering::Relaxed);
             }
-            *result.lock().unwrap_or_else(std::sync::PoisonError::into_inner) = Some(judged);
+            // No other thread has this place.
+            let _ = result.set(judged);
         }
     };
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
@@ -41,8 +42,6 @@ pub fn errors(
             scope.spawn(work);
         }
     });
-    let judged = results
-        .into_iter()
-        .filter_map(|result| result.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner));
+    let judged = results.into_iter().filter_map(OnceLock::into_inner);
     judged.collect::<Result<_, _>>().map_err(|error| -> Box<dyn Error> { error })
 }

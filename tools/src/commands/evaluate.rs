@@ -103,10 +103,6 @@ pub fn run(args: &Args, common: Common) -> super::Result {
 
 type Found<'a> = (&'a Path, Vec<Outage>);
 
-fn starts_of<'a>((_, found): &'a Found<'_>) -> &'a [Outage] {
-    found
-}
-
 /// Hides the courses of each drive from every start on.
 fn outages(args: &Args, common: Common) -> super::Result {
     let weights = args.unit.sent.open()?;
@@ -146,10 +142,10 @@ fn outages(args: &Args, common: Common) -> super::Result {
     let without: String =
         args.without.iter().map(|part| format!(", without {part:?}").to_lowercase()).collect();
     let table = |(set, drives): &(String, Vec<Found<'_>>)| {
-        Outages::new(&format!("{set}{without}"), &lengths, drives.iter().map(starts_of))
+        Outages::new(&format!("{set}{without}"), &lengths, drives.iter().map(|(_, found)| found.as_slice()))
     };
     let each: Vec<Outages> = sets.iter().map(table).collect();
-    let all = Outages::new(&format!("all{without}"), &lengths, drives.map(starts_of));
+    let all = Outages::new(&format!("all{without}"), &lengths, drives.map(|(_, found)| found.as_slice()));
     if common.json {
         let Outages { outage, outage_after_20_s, .. } = all;
         let json =

@@ -97,10 +97,8 @@ pub fn run(args: &Args, common: Common) -> super::Result {
 
     let start_us = drive.vehicle.recording.start.map_or(0, |start| (1e6 * start).round() as u64);
     let mut statuses = BTreeMap::from(STATUSES.map(|status| (status_name(status), 0u64)));
-    let mut board = Board::new(Config::DEFAULT, drive.wheels(), GyroNet::new(weights.blob()?));
-    if drive.facts.has_course {
-        board.take_courses();
-    }
+    let board = Board::new(Config::DEFAULT, drive.wheels(), GyroNet::new(weights.blob()?));
+    let board = if drive.facts.has_course { board.moving(true) } else { board };
     let mut steps = Steps::new(&drive, board)?;
     let bar = progress::bar(common, drive.facts.rows, drive.name());
     for step in &mut steps {

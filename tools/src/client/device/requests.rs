@@ -137,9 +137,7 @@ impl<B: Bus> Device<B> {
 
     /// Returns the counts of requests that were refused for lack of access since the board started.
     pub fn access_counters(&mut self) -> Result<AccessCounters> {
-        let words = self.read(ACCESS_COUNTERS)?;
-        let mut words = Words(&words);
-        words.fields()
+        Words(&self.read(ACCESS_COUNTERS)?).fields()
     }
 
     /// Restarts the board, once the vehicle is proven to stand: what was stored just before may have interrupted the proof.
