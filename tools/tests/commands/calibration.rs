@@ -7,16 +7,14 @@ use gyronet_tools::bundled::SIMULATED_DRIVE;
 fn replay_applies_the_gain_of_a_unit() {
     let folder = scratch("calibration");
     std::fs::write(folder.join("drive.csv"), SIMULATED_DRIVE).unwrap();
-    let (good, err) = gyronet_in(&folder, &["-q", "calibrate", "drive.csv", "--out", "unit.json"]);
-    assert!(good, "{err}");
+    gyronet_in(&folder, &["-q", "calibrate", "drive.csv", "--out", "unit.json"]).unwrap();
     // A gain of one per cent in place of what was found.
     let mut unit: serde_json::Value =
         serde_json::from_str(&std::fs::read_to_string(folder.join("unit.json")).unwrap()).unwrap();
     unit["gyro_map"] = serde_json::json!([[1, 0, 0], [0, 1, 0], [0, 0, 1.01]]);
     std::fs::write(folder.join("unit.json"), unit.to_string()).unwrap();
     let replay = |out: &str, more: &[&str]| {
-        let (good, err) = gyronet_in(&folder, &[&["-q", "replay", "drive.csv", "--csv", out], more].concat());
-        assert!(good, "{err}");
+        gyronet_in(&folder, &[&["-q", "replay", "drive.csv", "--csv", out], more].concat()).unwrap();
         column(&folder.join(out), ',', 1)
     };
     let (plain, calibrated) = (replay("plain.csv", &[]), replay("unit.csv", &["--calibration", "unit.json"]));
@@ -26,8 +24,8 @@ fn replay_applies_the_gain_of_a_unit() {
 
     unit["weights"] = serde_json::json!(1);
     std::fs::write(folder.join("unit.json"), unit.to_string()).unwrap();
-    let (good, err) = gyronet_in(&folder, &["replay", "drive.csv", "--calibration", "unit.json"]);
-    assert!(!good && err.contains("computed with the weights 00000001"), "{err}");
+    let err = gyronet_in(&folder, &["replay", "drive.csv", "--calibration", "unit.json"]).unwrap_err();
+    assert!(err.contains("computed with the weights 00000001"), "{err}");
 }
 
 #[test]
@@ -49,7 +47,7 @@ fn nothing_that_was_found_is_no_file() {
         text += &(fields.join(",") + "\n");
     }
     std::fs::write(folder.join("drive.csv"), text).unwrap();
-    let (good, err) = gyronet_in(&folder, &["-q", "calibrate", "drive.csv", "--out", "unit.json"]);
-    assert!(!good && err.contains("unit.json: not written: nothing could be calibrated"), "{err}");
+    let err = gyronet_in(&folder, &["-q", "calibrate", "drive.csv", "--out", "unit.json"]).unwrap_err();
+    assert!(err.contains("unit.json: not written: nothing could be calibrated"), "{err}");
     assert!(!folder.join("unit.json").exists());
 }

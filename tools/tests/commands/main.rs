@@ -28,10 +28,10 @@ fn gyronet(arguments: &[&str]) -> Output {
     command(arguments).output().unwrap()
 }
 
-/// Runs the command in a folder. Returns true if it succeeded, and its standard error.
-fn gyronet_in(folder: &Path, arguments: &[&str]) -> (bool, String) {
+/// Runs the command in a folder. Returns its standard error, as an error if it failed.
+fn gyronet_in(folder: &Path, arguments: &[&str]) -> Result<String, String> {
     let output = command(arguments).current_dir(folder).output().unwrap();
-    (output.status.success(), text(&output.stderr))
+    if output.status.success() { Ok(text(&output.stderr)) } else { Err(text(&output.stderr)) }
 }
 
 fn scratch(name: &str) -> PathBuf {

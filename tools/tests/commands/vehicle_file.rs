@@ -32,12 +32,12 @@ fn folder(name: &str, vehicle: &str) -> PathBuf {
 fn mounting_and_radius_are_used_and_named() {
     let folder = folder("vehicle_file", "[mounting]\nroll_deg = 180\n[wheels]\nradius_m = 0.578\n");
     std::fs::write(folder.join("plain.csv"), SIMULATED_DRIVE).unwrap();
-    let (good, err) =
-        gyronet_in(&folder, &["replay", "drive.csv", "--csv", "rates.csv", "--tum", "path.tum"]);
-    assert!(good && err.contains("drive.csv: vehicle file drive.toml\n"), "{err}");
-    let (good, err) =
-        gyronet_in(&folder, &["replay", "plain.csv", "--csv", "plain_rates.csv", "--tum", "plain.tum"]);
-    assert!(good && !err.contains("vehicle file"), "{err}");
+    let err =
+        gyronet_in(&folder, &["replay", "drive.csv", "--csv", "rates.csv", "--tum", "path.tum"]).unwrap();
+    assert!(err.contains("drive.csv: vehicle file drive.toml\n"), "{err}");
+    let err = gyronet_in(&folder, &["replay", "plain.csv", "--csv", "plain_rates.csv", "--tum", "plain.tum"])
+        .unwrap();
+    assert!(!err.contains("vehicle file"), "{err}");
     let [turned, plain] = ["rates.csv", "plain_rates.csv"].map(|name| column(&folder.join(name), ',', 2));
     assert_eq!(turned.len(), 2_200);
     for (turned, plain) in turned.iter().zip(&plain) {
@@ -50,17 +50,17 @@ fn mounting_and_radius_are_used_and_named() {
     assert!(plain > 10.0 && (turned / plain - 2.0).abs() < 1e-3, "{turned} {plain}");
 
     for command in ["evaluate", "calibrate", "doctor"] {
-        let (_, err) = gyronet_in(&folder, &[command, "drive.csv"]);
+        let err = gyronet_in(&folder, &[command, "drive.csv"]).unwrap_or_else(|err| err);
         assert!(err.contains("drive.csv: vehicle file drive.toml\n"), "{command}: {err}");
     }
     std::fs::write(folder.join("drive.mcap"), b"\x89MCAP0\r\n").unwrap();
     for command in ["evaluate", "calibrate", "doctor", "replay"] {
-        let (good, err) = gyronet_in(&folder, &[command, "drive.mcap"]);
+        let err = gyronet_in(&folder, &[command, "drive.mcap"]).unwrap_err();
         let command = "gyronet import drive.mcap --out drive.csv\n";
-        assert!(!good && err.ends_with(command) && err.lines().count() == 1, "{err}");
+        assert!(err.ends_with(command) && err.lines().count() == 1, "{err}");
     }
-    let (good, err) = gyronet_in(&folder, &["demo", "drive.csv", "--out", "demo"]);
-    assert!(good && err.contains("drive.csv: vehicle file drive.toml\n"), "{err}");
+    let err = gyronet_in(&folder, &["demo", "drive.csv", "--out", "demo"]).unwrap();
+    assert!(err.contains("drive.csv: vehicle file drive.toml\n"), "{err}");
     let page = std::fs::read_to_string(folder.join("demo/demo.html")).unwrap();
     assert!(page.contains("(radius 0.578 m)"), "the page says what the path rests on");
 }
@@ -87,10 +87,9 @@ fn what_import_writes_is_not_turned_again() {
     let folder = folder("vehicle_import", "[mounting]\nroll_deg = 180\n");
     let import =
         |out: &str| gyronet_in(&folder, &["import", "drive.csv", "--vehicle", "drive.toml", "--out", out]);
-    let (good, err) = import("drive.csv");
-    assert!(!good && err.contains("drive.csv: --out would overwrite it"), "{err}");
-    let (good, err) = import("level.csv");
-    assert!(good, "{err}");
+    let err = import("drive.csv").unwrap_err();
+    assert!(err.contains("drive.csv: --out would overwrite it"), "{err}");
+    import("level.csv").unwrap();
     let up = column(&folder.join("level.csv"), ',', 3);
     assert!(up.len() == 2_500 && up.iter().all(|up| *up > 5.0));
     let header = std::fs::read_to_string(folder.join("level.csv")).unwrap();
@@ -98,12 +97,11 @@ fn what_import_writes_is_not_turned_again() {
         header.starts_with("t_s,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z,ref_gyr_z,wheel1_rate,wheel2_rate"),
         "{header}"
     );
-    let (good, err) = gyronet_in(&folder, &["replay", "level.csv", "--csv", "rates.csv"]);
-    assert!(good && err.contains("level.csv: vehicle file level.toml\n"), "{err}");
+    let err = gyronet_in(&folder, &["replay", "level.csv", "--csv", "rates.csv"]).unwrap();
+    assert!(err.contains("level.csv: vehicle file level.toml\n"), "{err}");
 
     // Neither turned nor stripped of wheels and reference by another import.
-    let (good, err) = gyronet_in(&folder, &["import", "level.csv", "--from", "1", "--out", "later.csv"]);
-    assert!(good, "{err}");
+    gyronet_in(&folder, &["import", "level.csv", "--from", "1", "--out", "later.csv"]).unwrap();
     let [level, later] =
         ["level.csv", "later.csv"].map(|name| std::fs::read_to_string(folder.join(name)).unwrap());
     assert_eq!(level.lines().next(), later.lines().next());
@@ -120,8 +118,7 @@ fn what_import_writes_is_not_turned_again() {
     )
     .unwrap();
     let outputs = ["--csv", "day.csv", "--tum", "day.tum", "--out", "day.log"];
-    let (good, err) = gyronet_in(&folder, &[&["replay", "level.csv"][..], &outputs].concat());
-    assert!(good, "{err}");
+    gyronet_in(&folder, &[&["replay", "level.csv"][..], &outputs].concat()).unwrap();
     let times = |name: &str, separator: char| column(&folder.join(name), separator, 0);
     let (plain, day, path) = (times("rates.csv", ','), times("day.csv", ','), times("day.tum", ' '));
     assert_eq!(plain.len(), day.len());
@@ -131,7 +128,7 @@ fn what_import_writes_is_not_turned_again() {
     assert!(log.starts_with("(170000000"), "{}", &log[..40]);
 
     std::fs::write(folder.join("level.toml"), "[mounting]\nrol_deg = 180\n").unwrap();
-    let (good, err) = gyronet_in(&folder, &["replay", "level.csv"]);
-    assert!(!good && err.contains("level.toml: not a valid vehicle file: "), "{err}");
+    let err = gyronet_in(&folder, &["replay", "level.csv"]).unwrap_err();
+    assert!(err.contains("level.toml: not a valid vehicle file: "), "{err}");
     assert!(err.contains("unknown field `rol_deg`"), "{err}");
 }
