@@ -76,14 +76,12 @@ pub fn run(args: &Args, json: bool) -> super::Result {
         // A trajectory that is missing from the folder is not an error; a missing folder is.
         fs::read_dir(&given.folder).map_err(named(&given.folder))?;
     }
-    let weights = match &args.weights {
-        Some(path) => WeightFile::read(path)?,
-        None => WeightFile::new("built-in weights", &GYRONET.0),
+    let open = |path: &Option<PathBuf>, built_in: &[u8]| match path {
+        Some(path) => WeightFile::read(path),
+        None => Ok(WeightFile::new("built-in weights", built_in)),
     };
-    let fog_weights = match &args.fog_weights {
-        Some(path) => WeightFile::read(path)?,
-        None => WeightFile::new("built-in weights", &FOGNET.0),
-    };
+    let weights = open(&args.weights, &GYRONET.0)?;
+    let fog_weights = open(&args.fog_weights, &FOGNET.0)?;
     let pseudo_weights = args.pseudo_fog_weights.as_deref().map(WeightFile::read).transpose()?;
     let mut network = GyroNet::new(weights.blob()?);
     let fog_blob = fog_weights.fog_blob()?;

@@ -51,11 +51,13 @@ fn exact() -> Sequence {
     }
 }
 
+fn errors(sequence: &Sequence) -> SequenceErrors {
+    SequenceErrors::new(sequence, &estimates::run(sequence, &mut Uncorrected))
+}
+
 #[test]
 fn each_method_does_what_it_says() {
-    let sequence = exact();
-    let estimates = estimates::run(&sequence, &mut Uncorrected);
-    let errors = SequenceErrors::new(&sequence, &estimates);
+    let errors = errors(&exact());
     let final_rad = |key: &str| errors.methods[key].final_unwrapped_rad;
     let seconds = 57.0;
     assert!((final_rad("raw") - 0.002 * seconds).abs() < 1e-4, "the bias alone: {}", final_rad("raw"));
@@ -80,14 +82,11 @@ fn wheels_alone_turn_by_their_difference() {
         let [left, right] = &mut step.wheels;
         (*left, *right) = (*left - 0.75 * step.fog, *right + 0.75 * step.fog);
     }
-    let estimates = estimates::run(&sequence, &mut Uncorrected);
-    let errors = SequenceErrors::new(&sequence, &estimates);
-    let wheels = errors.methods["wheels"];
+    let wheels = errors(&sequence).methods["wheels"];
     assert!(wheels.final_unwrapped_rad < 1e-9 && wheels.ate_m < 1e-6, "{wheels:?}");
     // A wheel base that is wrong by a tenth makes the turn wrong by a tenth.
     sequence.wheel_base = 1.5 / 1.1;
-    let estimates = estimates::run(&sequence, &mut Uncorrected);
-    let errors = SequenceErrors::new(&sequence, &estimates);
+    let errors = errors(&sequence);
     let turned: f64 = sequence.turns()[300..].iter().sum();
     assert!((errors.methods["wheels"].final_unwrapped_rad - 0.1 * turned.abs()).abs() < 1e-9, "{errors:?}");
 }
@@ -136,8 +135,7 @@ fn what_needs_to_stand_still_is_left_out_when_it_does_not() {
     for (k, step) in sequence.steps.iter_mut().enumerate().take(400) {
         step.angular_rate[2] = 0.002 * k as f32;
     }
-    let estimates = estimates::run(&sequence, &mut Uncorrected);
-    let errors = SequenceErrors::new(&sequence, &estimates);
+    let errors = errors(&sequence);
     assert!(
         !errors.methods.contains_key(Method::STATIC.key) && !errors.methods.contains_key(Method::GYRONET.key)
     );
@@ -148,9 +146,7 @@ fn what_needs_to_stand_still_is_left_out_when_it_does_not() {
 #[test]
 fn sequences_of_the_paper_get_the_tables_that_it_has_for_them() {
     let of = |name: &str| {
-        let sequence = Sequence { name: name.into(), ..exact() };
-        let estimates = estimates::run(&sequence, &mut Uncorrected);
-        let mut errors = SequenceErrors::new(&sequence, &estimates);
+        let mut errors = errors(&Sequence { name: name.into(), ..exact() });
         let fognet = errors.methods["fog"];
         errors.methods.insert(Method::FOGNET.key, fognet);
         errors.order.push(Method::FOGNET);
@@ -175,11 +171,7 @@ fn sequences_of_the_paper_get_the_tables_that_it_has_for_them() {
 
 #[test]
 fn json_and_tables_of_simulated_sequences() {
-    let of = |name: &str| {
-        let sequence = sequence(name, 60);
-        SequenceErrors::new(&sequence, &estimates::run(&sequence, &mut Uncorrected))
-    };
-    let results = Results::new(vec![of("k"), of("n")]);
+    let results = Results::new(["k", "n"].map(|name| errors(&sequence(name, 60))).into());
     let json = serde_json::to_value(&results).unwrap();
     assert_eq!(json["simulated"], true);
     for method in ["raw", "static", "fir", "vqf", "gyronet", "fog", "fog_earth"] {
