@@ -1,7 +1,7 @@
 //! Who may write, on the image as flashed: keys, signatures, and challenges of the chip's random numbers.
 
 use crate::common::{self, START};
-use crate::service::{self, on_bus};
+use crate::service::{self, by_owner, on_bus};
 use gyronet::store::Configuration;
 use gyronet_host_tests::board::Board;
 use gyronet_tools::client::device::Authority;
@@ -56,9 +56,7 @@ fn challenges_never_repeat_and_fail_with_the_generator() {
         board.run(START);
     }
     fail_with_the_generator(&mut board);
-    let mut device = on_bus(&mut board);
-    device.authorise(Authority::Key(key.clone()));
-    device.restart().expect("access is proven");
+    by_owner(&mut board, &key).restart().expect("access is proven");
 }
 
 #[test]
@@ -69,16 +67,14 @@ fn a_signature_is_checked_while_the_rates_go_out() {
     let now = board.counts().time;
     common::send(&mut board, &common::drive(700), now);
     board.run(Duration::from_secs(4));
-    let mut device = on_bus(&mut board);
-    device.authorise(Authority::Key(key.clone()));
-    device.set_configuration(&configuration).expect("the records' sector is erased here");
+    let stored = by_owner(&mut board, &key).set_configuration(&configuration);
+    stored.expect("the records' sector is erased here");
     // The next tester is on another line.
     service::enter(&mut board, 1);
     board.run(Duration::from_millis(500));
     let begin = board.counts().time;
     let _ = board.can_frames();
-    let mut device = service::on_line(&mut board);
-    device.authorise(Authority::Key(key.clone()));
+    let mut device = service::on_line(&mut board).authorise(Authority::Key(key));
     device.set_configuration(&configuration).expect("it is signed");
     let took = board.counts().time - begin;
     let gap = common::gap(&board.can_frames(), 10);

@@ -71,8 +71,7 @@ fn board_in_order() {
     assert_well_set(&mut board);
     assert_eq!(board.read(At::Address(SPARE), SLOT_SIZE), vec![0xFF; SLOT_SIZE], "the sector is left blank");
     // From the next power-on the brown-out reset is at its level.
-    board.power_cycle(SECOND);
-    board.run(2 * SECOND);
+    board.power_cycle(SECOND, 2 * SECOND);
     let text = String::from_utf8(board.sent(REPORT)).expect("text");
     assert!(text.contains("brown-out    PASS  level 3 (2.8 V)"), "{text}");
 }

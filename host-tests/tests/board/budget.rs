@@ -94,8 +94,7 @@ fn longest_paths_at_both_clocks() {
             board.configure("RCC.crystal_hz", serde_json::Value::Null);
             board.configure("USART2.baud", 500_000);
         }
-        board.power_cycle(SAMPLE);
-        board.run(3 * SECOND);
+        board.power_cycle(SAMPLE, 3 * SECOND);
         let info = service::info(&mut board);
         assert_eq!(u64::from(info.identity.clock_hz), hz as u64);
         if slow == 1 {
@@ -110,16 +109,15 @@ fn longest_paths_at_both_clocks() {
         let content = service::storing(&signed);
         let trailer = key.trailer(0x0100, None, 1, &content[3..]);
         for (configuration, is_right) in [(Configuration::DEFAULT, false), (signed, true)] {
-            let mut device = on_line(&mut board);
-            device.authorise(Authority::Signature(trailer));
+            let mut device = on_line(&mut board).authorise(Authority::Signature(trailer));
             match device.set_configuration(&configuration) {
                 Ok(()) => assert!(is_right),
                 Err(DeviceError::Refused(Refusal::Signature)) => assert!(!is_right),
                 other => panic!("{other:?}"),
             }
         }
-        let mut device = on_line(&mut board);
-        device.authorise(Authority::Signature(key.trailer(0xFF01, None, 2, &weights::DEFAULT.0)));
+        let trailer = key.trailer(0xFF01, None, 2, &weights::DEFAULT.0);
+        let mut device = on_line(&mut board).authorise(Authority::Signature(trailer));
         upload(&mut device, &weights::DEFAULT.0, |_| {}).expect("it is signed");
         let before = board.counts().instructions;
         drive(&mut board, 6);

@@ -89,8 +89,7 @@ fn a_receiver_on_its_line_teaches_what_frames_teach() {
     Stored::default().record(&line).record(&learned).write_to(&mut board);
     // The power is cut on the way. The gain of earlier drives is there after it, and the receiver is unplugged later.
     for seconds in [[16, 0], [16, 11]] {
-        board.power_cycle(MS);
-        board.run(START);
+        board.power_cycle(MS, START);
         board.can_frames();
         let mut vehicle = Winding::new(7);
         let mut host = replay::Board::new(&bus, &learned, blob());
@@ -124,8 +123,7 @@ fn a_receiver_on_its_line_teaches_what_frames_teach() {
     // RMC: a good one, and a reckoned one, which is counted; then one that the line damages, and the next one.
     let nmea = GnssSettings { protocol: GnssProtocol::Nmea, ..LINE };
     Stored::default().record(&configuration(sources(nmea)[0])).write_to(&mut board);
-    board.power_cycle(MS);
-    board.run(START);
+    board.power_cycle(MS, START);
     let rmc = |mode| {
         sentence(&format!("GNRMC,092633.00,A,4722.61400,N,00832.50200,E,9.438,210.00,170524,,,{mode}"))
     };

@@ -126,7 +126,7 @@ fn a_nucleo_stores_over_the_bus_without_a_gap() {
     let other = sent.iter().zip(&undisturbed).find(|((_, sent), (_, alone))| sent != alone);
     assert_eq!(other, None, "the same as without a store");
 
-    board.power_cycle(MS);
+    board.power_cycle(MS, Duration::ZERO);
     board.configure("FDCAN1.bit_rate", configuration.can.bits_per_second);
     board.run(100 * MS);
     assert_eq!(on_bus(&mut board).configuration().expect("a response"), configuration);
@@ -184,7 +184,7 @@ fn a_nucleo_takes_no_can_fd_and_starts_again_without_its_clock() {
     }
 
     board.configure("RCC.hse_hz", serde_json::Value::Null);
-    board.power_cycle(MS);
+    board.power_cycle(MS, Duration::ZERO);
     assert!(board.run_until("iwdg_expired", Duration::from_millis(1_300)).is_some());
     board.configure("RCC.hse_hz", 8_000_000);
     board.run(Duration::from_millis(1_300));
@@ -208,15 +208,10 @@ fn a_nucleo_with_a_key_is_written_by_its_owner_alone() {
     board.run(300 * MS);
     access::fail_with_the_generator(&mut board);
     let configuration = Configuration { latitude_deg: Some(1.0), ..Configuration::DEFAULT };
-    let mut write = |authority| {
-        let mut device = on_bus(&mut board);
-        device.authorise(authority);
-        device.set_configuration(&configuration)
-    };
+    let mut write = |authority| on_bus(&mut board).authorise(authority).set_configuration(&configuration);
     assert!(write(Authority::None).is_err() && write(Authority::Key(other)).is_err());
     write(Authority::Key(key)).expect("it is the owner's");
-    board.power_cycle(MS);
-    board.run(100 * MS);
+    board.power_cycle(MS, 100 * MS);
     assert_eq!(on_bus(&mut board).configuration().expect("a response"), configuration);
 }
 
@@ -226,11 +221,11 @@ fn after_cut(board: &mut Board, cut: u32) -> (Configuration, FlashState) {
     if cut % 3 == 1 {
         board.reset_pin();
     } else {
-        board.power_cycle(MS);
+        board.power_cycle(MS, Duration::ZERO);
     }
     if cut % 3 == 2 {
         board.run(MS * (cut + 1));
-        board.power_cycle(MS);
+        board.power_cycle(MS, Duration::ZERO);
     }
     board.run(400 * MS);
     let configuration = on_bus(board).configuration().expect("it runs, and answers");

@@ -21,7 +21,7 @@ fn with_fd() -> Option<Board> {
     let mut configuration = Configuration::DEFAULT;
     configuration.can.yaw = configuration.can.yaw.map(|yaw| YawSettings { fd: Some(FD_ID), ..yaw });
     on_bus(&mut board).set_configuration(&configuration).expect("there is no sensor");
-    board.power_cycle(MS);
+    board.power_cycle(MS, Duration::ZERO);
     let _ = board.own_frames();
     Some(board)
 }

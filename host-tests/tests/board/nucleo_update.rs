@@ -3,7 +3,7 @@
 
 use crate::common::{MS, SAMPLE, gap, id, resets, stand};
 use crate::nucleo::{boot, built};
-use crate::service::{self, on_bus};
+use crate::service::{self, by_owner, on_bus};
 use crate::update::{Cuts, Recorder};
 use embedded_can::Frame;
 use gyronet::can::DataFrame;
@@ -40,8 +40,8 @@ fn update_with(
     key: &PrivateKey,
 ) -> (Vec<(Duration, DataFrame)>, Result<Slot, String>) {
     let mut log = Vec::new();
-    let mut device = Device::new(Recorder(board.bus(), &mut log), "the virtual board");
-    device.authorise(Authority::Key(key.clone()));
+    let device = Device::new(Recorder(board.bus(), &mut log), "the virtual board");
+    let mut device = device.authorise(Authority::Key(key.clone()));
     let slot = update(&mut device, file, |_, _| ()).map_err(|error| error.to_string());
     drop(device);
     (log, slot)
@@ -73,9 +73,7 @@ fn a_nucleo_is_updated_over_can_without_a_gap_and_keeps_its_records() {
         );
         assert!(took < 60 * S && gap(&log, 100) < SAMPLE + MS, "{took:?} {:?}", gap(&log, 100));
         assert!(round == 0 || erased >= 29, "the image before is erased");
-        let mut device = on_bus(&mut board);
-        device.authorise(Authority::Key(key.clone()));
-        device.restart().expect("it stands");
+        by_owner(&mut board, &key).restart().expect("it stands");
         board.run(30 * MS);
         let _ = board.can_frames();
         board.run(START);
@@ -91,15 +89,12 @@ fn a_nucleo_is_updated_over_can_without_a_gap_and_keeps_its_records() {
         let refused = refused.expect_err("it is on trial");
         assert!(refused.contains(&FirmwareError::OnTrial.to_string()), "{refused}");
         // Settings that are stored on trial are those of both images.
-        let mut device = on_bus(&mut board);
-        device.authorise(Authority::Key(key.clone()));
-        device.set_configuration(&settings(latitude)).expect("it stands");
+        by_owner(&mut board, &key).set_configuration(&settings(latitude)).expect("it stands");
         let _ = board.can_frames();
         board.run(13 * S);
         println!("at most {:.2?} while it is confirmed", gap(&board.can_frames(), 100));
         assert_eq!(firmware(&mut board), (Some(to), FirmwareState::Confirmed));
-        board.power_cycle(10 * MS);
-        board.run(START);
+        board.power_cycle(10 * MS, START);
         assert_eq!(firmware(&mut board), (Some(to), FirmwareState::Confirmed));
         assert_eq!(on_bus(&mut board).configuration().expect("a response"), settings(latitude));
         assert_eq!(on_bus(&mut board).access().expect("a response").state, "locked");
@@ -119,13 +114,11 @@ fn a_nucleo_refuses_an_image_that_was_not_signed_and_none_where_no_boot_loader_i
     changed.images[1][0x1_0000] ^= 1;
     let (_, refused) = update_with(&mut board, &changed, &key);
     assert!(refused.is_err(), "the received image is not the one that was signed");
-    board.power_cycle(MS);
-    board.run(START);
+    board.power_cycle(MS, START);
     assert_eq!(firmware(&mut board), (Some(Slot::A), FirmwareState::Confirmed));
     // Without the boot loader in the other bank a swap would start nothing.
     board.patch(At::Address(FLASH_BASE + BANK + BOOT_SIZE - 16), &[0; 16]);
-    board.power_cycle(MS);
-    board.run(START);
+    board.power_cycle(MS, START);
     assert_eq!(firmware(&mut board), (None, FirmwareState::Alone));
 }
 
@@ -156,7 +149,7 @@ fn rolled_back(board: &mut Board) {
         board.run(START);
         assert_eq!(firmware(board), (Some(Slot::A), FirmwareState::RolledBack));
         assert_eq!(on_bus(board).configuration().expect("a response"), settings(48.0));
-        board.power_cycle(10 * MS);
+        board.power_cycle(10 * MS, Duration::ZERO);
     }
 }
 
@@ -218,8 +211,8 @@ fn a_nucleo_whose_image_is_damaged_starts_the_other_one_and_without_any_flashes(
     let damage = |board: &mut Board| {
         let byte = board.read(place, 1)[0];
         board.patch(place, &[byte ^ 0x10]);
-        board.power_cycle(10 * MS);
-        let _ = (board.run(START), board.events(), board.bus_log());
+        board.power_cycle(10 * MS, START);
+        let _ = (board.events(), board.bus_log());
     };
     damage(&mut board);
     assert_eq!(firmware(&mut board), (Some(Slot::A), FirmwareState::NewerDamaged));
@@ -252,7 +245,7 @@ fn a_nucleo_starts_after_a_reset_or_a_cut_at_any_time_of_a_swap() {
             if is_reset {
                 board.reset_pin();
             } else {
-                board.power_cycle(MS);
+                board.power_cycle(MS, Duration::ZERO);
             }
             board.run(START);
             let state = firmware(&mut board);

@@ -216,8 +216,7 @@ fn old_weights_stay_usable_until_the_new_ones_are_activated() {
         board.restore(AFTER);
         keep(&mut board, BEFORE);
     }
-    board.power_cycle(Duration::from_millis(10));
-    board.run(START);
+    board.power_cycle(Duration::from_millis(10), START);
     assert_eq!(service::info(&mut board).weights_crc, Some(crc(&new)), "without a cut");
     assert_ne!(crc(&new), crc(&weights::DEFAULT.0));
     let Tried { cuts, seen } = tried;

@@ -8,7 +8,7 @@ use gyronet_host_tests::board::{Board, CanBus, Line};
 use gyronet_host_tests::tester::segment;
 use gyronet_host_tests::wire::{data_frame, id11};
 use gyronet_tools::client::bus::SlcanBus;
-use gyronet_tools::client::device::Device;
+use gyronet_tools::client::device::{Authority, Device};
 use gyronet_tools::signing::PrivateKey;
 use std::time::Duration;
 
@@ -26,6 +26,11 @@ pub fn on_line(board: &mut Board) -> Device<SlcanBus<Line<'_>>> {
 /// A tester on CAN, which takes the frames that the board sends meanwhile.
 pub fn on_bus(board: &mut Board) -> Device<CanBus<'_>> {
     Device::new(board.bus(), "the virtual board")
+}
+
+/// The same, of the owner of the board's key.
+pub fn by_owner<'b>(board: &'b mut Board, key: &PrivateKey) -> Device<CanBus<'b>> {
+    on_bus(board).authorise(Authority::Key(key.clone()))
 }
 
 pub fn restart(board: &mut Board) {

@@ -11,7 +11,6 @@ use gyronet::store::{Configuration, Learned, Slot};
 use gyronet_host_tests::board::{At, Board};
 use gyronet_host_tests::replay;
 use gyronet_host_tests::stored::{crc, other_weights};
-use gyronet_tools::client::device::Authority;
 use gyronet_tools::client::device::upload::{Uploaded, upload};
 use std::time::Duration;
 
@@ -155,8 +154,7 @@ fn uploaded_weights_run_from_their_slot() {
     let crc = crc(&file);
     let key = service::lock(&mut board);
     let (done, took) = timed(&mut board, |board| {
-        let mut device = on_bus(board);
-        device.authorise(Authority::Key(key));
+        let mut device = service::by_owner(board, &key);
         let done = upload(&mut device, &file, |_| {});
         device.restart().expect("access is proven");
         board.run(START);

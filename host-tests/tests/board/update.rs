@@ -69,14 +69,13 @@ fn the_whole_image_is_updated_over_can_while_rates_are_sent() {
     let configuration = Configuration { latitude_deg: Some(48.1), ..Configuration::DEFAULT };
     on_bus(&mut board).set_configuration(&configuration).expect("it stands");
     let key = service::lock(&mut board);
-    on_bus(&mut board).authorise(Authority::None);
     assert_eq!(firmware(&mut board), (Some(Slot::A), FirmwareState::Confirmed));
     stand(&mut board, 6_000);
     board.run(6 * S);
     let _ = (board.events(), board.can_frames());
     let (begin, mut log, mut at) = (board.counts().time, Vec::new(), 0);
-    let mut device = Device::new(Recorder(board.bus(), &mut log), "the virtual board");
-    device.authorise(Authority::Key(key.clone()));
+    let device = Device::new(Recorder(board.bus(), &mut log), "the virtual board");
+    let mut device = device.authorise(Authority::Key(key.clone()));
     let slot = update(&mut device, &update_file, |sent, _| at = sent)
         .unwrap_or_else(|error| panic!("after {at} bytes: {error}"));
     drop(device);
@@ -110,9 +109,7 @@ fn the_whole_image_is_updated_over_can_while_rates_are_sent() {
     let lines = common::counters(&mut board).lines;
     assert!(lines.frames_lost == 2 && lines.line_errors >= 2 * 512, "{lines:?}");
     // The first frame of the new image, and its confirmation.
-    let mut device = on_bus(&mut board);
-    device.authorise(Authority::Key(key));
-    device.restart().expect("access is proven");
+    service::by_owner(&mut board, &key).restart().expect("access is proven");
     let _ = (board.run(100 * MS), board.can_frames());
     board.run(START);
     assert_eq!(firmware(&mut board), (Some(Slot::B), FirmwareState::OnTrial));
@@ -122,8 +119,7 @@ fn the_whole_image_is_updated_over_can_while_rates_are_sent() {
     assert!(first - reset.0 < 300 * MS);
     board.run(16 * S);
     assert_eq!(firmware(&mut board), (Some(Slot::B), FirmwareState::Confirmed));
-    board.power_cycle(10 * MS);
-    board.run(START);
+    board.power_cycle(10 * MS, START);
     assert_eq!(firmware(&mut board), (Some(Slot::B), FirmwareState::Confirmed));
     assert_eq!(service::configuration(&mut board), configuration, "it outlives the update");
     assert_eq!(on_bus(&mut board).access().expect("a response").state, "locked", "and so does the key");
@@ -177,8 +173,7 @@ fn rolled_back(board: &mut Board) {
     assert_eq!(firmware(board), (Some(Slot::A), FirmwareState::RolledBack));
     let troubles = on_bus(board).ask(&[0x19, 2, 0x09]).expect("a list");
     assert!(troubles[2..].chunks(4).any(|trouble| trouble[..3] == [0x5A, 0x03, 0x52]), "{troubles:02x?}");
-    board.power_cycle(10 * MS);
-    board.run(START);
+    board.power_cycle(10 * MS, START);
     assert_eq!(firmware(board), (Some(Slot::A), FirmwareState::RolledBack), "for good");
 }
 
@@ -263,21 +258,19 @@ fn an_image_that_is_damaged_after_its_confirmation_gives_way_and_without_any_the
         board.patch(place, &[byte ^ 0x10]);
     };
     damage(&mut board, Slot::B);
-    board.power_cycle(10 * MS);
-    board.run(2 * START);
+    board.power_cycle(10 * MS, 2 * START);
     assert_eq!(firmware(&mut board), (Some(Slot::A), FirmwareState::NewerDamaged));
     damage(&mut board, Slot::A);
     board.configure("GPIOA.watch", vec![10]);
-    board.power_cycle(10 * MS);
-    let _ = (board.run(2 * START), board.events(), board.bus_log());
+    board.power_cycle(10 * MS, 2 * START);
+    let _ = (board.events(), board.bus_log());
     board.run(3 * S);
     let edges = board.events().iter().filter(|event| event.kind == "pin").count();
     assert!((8..=12).contains(&edges), "two flashes a second: {edges} edges");
     assert_eq!(board.bus_log().len(), 0);
     // A probe flashes it.
     damage(&mut board, Slot::A);
-    board.power_cycle(10 * MS);
-    board.run(2 * START);
+    board.power_cycle(10 * MS, 2 * START);
     assert_eq!(firmware(&mut board).0, Some(Slot::A));
 }
 
@@ -349,7 +342,7 @@ impl Cuts<'_> {
                 board.cut_after(access, delay);
                 act(board);
                 let _ = board.run_until("power_off", limit + 300 * MS);
-                board.power_cycle(MS);
+                board.power_cycle(MS, Duration::ZERO);
                 assert!((0..3).any(|_| (self.starts)(board)), "{name}: {access} of {count}, {delay:?}");
             }
         }

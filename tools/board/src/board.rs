@@ -92,10 +92,12 @@ impl Board {
         self.ask("power_off", json!({}));
     }
 
-    pub fn power_cycle(&mut self, off: Duration) {
+    /// Removes power for a time, and applies it for another one.
+    pub fn power_cycle(&mut self, off: Duration, on: Duration) {
         self.power_off();
         self.run(off);
         self.power_on();
+        self.run(on);
     }
 
     /// Pulls the reset pin low for a moment.

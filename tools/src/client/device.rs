@@ -63,8 +63,9 @@ impl<B: Bus> Device<B> {
         Ok(Self { bus, name: name.to_owned(), request, response, authority: Authority::None })
     }
 
-    pub fn authorise(&mut self, authority: Authority) {
-        self.authority = authority;
+    #[must_use]
+    pub fn authorise(self, authority: Authority) -> Self {
+        Self { authority, ..self }
     }
 
     /// Sends a request, up to three times, and returns the positive response without its first byte.

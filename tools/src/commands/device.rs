@@ -138,8 +138,8 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         clap::Error::raw(clap::error::ErrorKind::MissingRequiredArgument, why).exit();
     };
     let ids = args.ids.unwrap_or(DiagnosisIds::DEFAULT);
-    let mut device = Device::with_ids(bus::open(port, args.baud)?, port, &ids)?;
-    device.authorise(match (&args.key, &args.signature) {
+    let device = Device::with_ids(bus::open(port, args.baud)?, port, &ids)?;
+    let mut device = device.authorise(match (&args.key, &args.signature) {
         (Some(path), _) => Authority::Key(PrivateKey::read(path)?),
         (None, Some(path)) => {
             let trailer =
