@@ -1,8 +1,7 @@
 //! Who may write, on the image as flashed: keys, signatures, and challenges of the chip's random numbers.
 
 use crate::common::{self, START};
-use crate::service::{self, by_owner, on_bus};
-use gyronet::store::Configuration;
+use crate::service::{self, at_latitude, by_owner, on_bus};
 use gyronet_host_tests::board::Board;
 use gyronet_tools::client::device::Authority;
 use gyronet_tools::client::device::error::DeviceError;
@@ -62,7 +61,7 @@ fn challenges_never_repeat_and_fail_with_the_generator() {
 #[test]
 fn a_signature_is_checked_while_the_rates_go_out() {
     let Some((mut board, key)) = locked() else { return };
-    let configuration = Configuration { latitude_deg: Some(48.0), ..Configuration::DEFAULT };
+    let configuration = at_latitude(48.0);
     // Standing for long enough.
     let now = board.counts().time;
     common::send(&mut board, &common::drive(700), now);

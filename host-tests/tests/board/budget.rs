@@ -105,7 +105,7 @@ fn longest_paths_at_both_clocks() {
         }
         board.paths();
         // Without the crystal there are no random numbers, and no challenge: what is written is signed before.
-        let signed = Configuration { latitude_deg: Some(1.0), ..Configuration::DEFAULT };
+        let signed = service::at_latitude(1.0);
         let content = service::storing(&signed);
         let trailer = key.trailer(0x0100, None, 1, &content[3..]);
         for (configuration, is_right) in [(Configuration::DEFAULT, false), (signed, true)] {

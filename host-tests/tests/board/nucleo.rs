@@ -3,7 +3,7 @@
 
 use crate::access;
 use crate::common::{self, MS, SAMPLE, SET, drive, faults, frames, host, id};
-use crate::service::{answer, ask, enter, on_bus, send, storing};
+use crate::service::{answer, ask, at_latitude, enter, on_bus, send, storing};
 use crate::spi_sensors::FAULTS;
 use embedded_can::{Frame, Id};
 use gyronet::can::DataFrame;
@@ -207,7 +207,7 @@ fn a_nucleo_with_a_key_is_written_by_its_owner_alone() {
     send(&mut board, &[0x11, 1]);
     board.run(300 * MS);
     access::fail_with_the_generator(&mut board);
-    let configuration = Configuration { latitude_deg: Some(1.0), ..Configuration::DEFAULT };
+    let configuration = at_latitude(1.0);
     let mut write = |authority| on_bus(&mut board).authorise(authority).set_configuration(&configuration);
     assert!(write(Authority::None).is_err() && write(Authority::Key(other)).is_err());
     write(Authority::Key(key)).expect("it is the owner's");
@@ -239,11 +239,11 @@ fn a_nucleo_survives_a_power_cut_at_any_time_of_a_store() {
     let Some(mut board) = boot(&[]) else { return };
     use_records(&mut board);
     board.run(200 * MS);
-    let of = |latitude| Configuration { latitude_deg: Some(latitude), ..Configuration::DEFAULT };
     // The first store erases eight sectors, the second only appends.
     let (mut states, mut kept) = (Vec::new(), 0);
-    for (old, new, step) in [(None, of(1.0), 2_100), (Some(of(1.0)), of(2.0), 1_000)] {
-        let old = old.unwrap_or(Configuration::DEFAULT);
+    for (old, new, step) in
+        [(Configuration::DEFAULT, at_latitude(1.0), 2_100), (at_latitude(1.0), at_latitude(2.0), 1_000)]
+    {
         send(&mut board, &[0x10, 0x03]);
         board.run(20 * MS);
         send(&mut board, &storing(&new));

@@ -3,16 +3,16 @@
 
 use crate::common::{MS, SAMPLE, gap, id, resets, stand};
 use crate::nucleo::{boot, built};
-use crate::service::{self, by_owner, on_bus};
-use crate::update::{Cuts, Recorder};
+use crate::service::{self, at_latitude, by_owner, on_bus};
+use crate::update::Cuts;
 use embedded_can::Frame;
 use gyronet::can::DataFrame;
 use gyronet::model::blob::CRC;
 use gyronet::service::device::FirmwareState;
+use gyronet::store::Slot;
 use gyronet::store::banks::{BANK, IMAGE, TRAILER, spread};
 use gyronet::store::firmware::{FirmwareError, Trailer};
 use gyronet::store::layout::{BOOT_SIZE, FLASH_BASE};
-use gyronet::store::{Configuration, Slot};
 use gyronet_host_tests::board::{At, Board};
 use gyronet_tools::client::device::update::{Update, update};
 use gyronet_tools::client::device::{Authority, Device};
@@ -29,10 +29,6 @@ fn firmware(board: &mut Board) -> (Option<Slot>, FirmwareState) {
     (firmware.slot, firmware.state)
 }
 
-fn settings(latitude: f32) -> Configuration {
-    Configuration { latitude_deg: Some(latitude), ..Configuration::DEFAULT }
-}
-
 /// Updates a board over CAN with a key, and returns what it sent meanwhile and how long that took.
 fn update_with(
     board: &mut Board,
@@ -40,7 +36,7 @@ fn update_with(
     key: &PrivateKey,
 ) -> (Vec<(Duration, DataFrame)>, Result<Slot, String>) {
     let mut log = Vec::new();
-    let device = Device::new(Recorder(board.bus(), &mut log), "the virtual board");
+    let device = Device::new(board.logged_bus(&mut log), "the virtual board");
     let mut device = device.authorise(Authority::Key(key.clone()));
     let slot = update(&mut device, file, |_, _| ()).map_err(|error| error.to_string());
     drop(device);
@@ -53,7 +49,7 @@ fn a_nucleo_is_updated_over_can_without_a_gap_and_keeps_its_records() {
     let Some(mut board) = boot(&[]) else { return };
     let (_, file) = built();
     board.run(START);
-    on_bus(&mut board).set_configuration(&settings(48.0)).expect("it stands");
+    on_bus(&mut board).set_configuration(&at_latitude(48.0)).expect("it stands");
     let key = service::lock(&mut board);
     assert_eq!(firmware(&mut board), (Some(Slot::A), FirmwareState::Confirmed));
     // To the other bank, and back to the first: an image and records are there already.
@@ -83,20 +79,20 @@ fn a_nucleo_is_updated_over_can_without_a_gap_and_keeps_its_records() {
         println!("first rate {:.0?} after the restart", first - reset);
         assert!(first - reset < 400 * MS);
         assert_eq!(firmware(&mut board), (Some(to), FirmwareState::OnTrial));
-        assert_eq!(on_bus(&mut board).configuration().expect("a response"), settings(latitude - 1.0));
+        assert_eq!(on_bus(&mut board).configuration().expect("a response"), at_latitude(latitude - 1.0));
         board.run(3 * S);
         let (_, refused) = update_with(&mut board, file, &key);
         let refused = refused.expect_err("it is on trial");
         assert!(refused.contains(&FirmwareError::OnTrial.to_string()), "{refused}");
         // Settings that are stored on trial are those of both images.
-        by_owner(&mut board, &key).set_configuration(&settings(latitude)).expect("it stands");
+        by_owner(&mut board, &key).set_configuration(&at_latitude(latitude)).expect("it stands");
         let _ = board.can_frames();
         board.run(13 * S);
         println!("at most {:.2?} while it is confirmed", gap(&board.can_frames(), 100));
         assert_eq!(firmware(&mut board), (Some(to), FirmwareState::Confirmed));
         board.power_cycle(10 * MS, START);
         assert_eq!(firmware(&mut board), (Some(to), FirmwareState::Confirmed));
-        assert_eq!(on_bus(&mut board).configuration().expect("a response"), settings(latitude));
+        assert_eq!(on_bus(&mut board).configuration().expect("a response"), at_latitude(latitude));
         assert_eq!(on_bus(&mut board).access().expect("a response").state, "locked");
     }
 }
@@ -134,7 +130,7 @@ fn install(board: &mut Board, image: &[u8], expected: u32) {
 fn bad(function: &str, code: &[u8], expected: u32) -> Option<Board> {
     let mut board = boot(&[])?;
     board.run(START);
-    on_bus(&mut board).set_configuration(&settings(48.0)).expect("it stands");
+    on_bus(&mut board).set_configuration(&at_latitude(48.0)).expect("it stands");
     let mut image = built().1.images[1].clone();
     let at = (board.symbol(function).0 - FLASH_BASE - IMAGE) as usize;
     image[at..at + code.len()].copy_from_slice(code);
@@ -148,7 +144,7 @@ fn rolled_back(board: &mut Board) {
     for _ in 0..2 {
         board.run(START);
         assert_eq!(firmware(board), (Some(Slot::A), FirmwareState::RolledBack));
-        assert_eq!(on_bus(board).configuration().expect("a response"), settings(48.0));
+        assert_eq!(on_bus(board).configuration().expect("a response"), at_latitude(48.0));
         board.power_cycle(10 * MS, Duration::ZERO);
     }
 }
@@ -264,14 +260,14 @@ fn a_nucleo_starts_an_image_after_a_cut_at_an_access_of_its_update() {
     let Some(mut board) = boot(&[]) else { return };
     let (_, file) = built();
     board.run(START);
-    on_bus(&mut board).set_configuration(&settings(48.0)).expect("it stands");
+    on_bus(&mut board).set_configuration(&at_latitude(48.0)).expect("it stands");
     // So that two sectors are erased, and the trailer's.
     install(&mut board, &file.images[1][..2_048], 0);
     board.patch(At::Address(FLASH_BASE + BANK + TRAILER), &spread(&[0; 64]));
     let starts = |board: &mut Board| {
         board.run(200 * MS);
         let Ok(info) = on_bus(board).info() else { return false };
-        assert_eq!(on_bus(board).configuration().expect("it answered"), settings(48.0));
+        assert_eq!(on_bus(board).configuration().expect("it answered"), at_latitude(48.0));
         info.firmware.slot.is_some()
     };
     let (delays, times) = (&[Duration::ZERO, Duration::from_micros(50)], [START, 14_200 * MS]);

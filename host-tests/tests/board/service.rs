@@ -52,6 +52,11 @@ pub fn configuration(board: &mut Board) -> Configuration {
     on_line(board).configuration().expect("a response")
 }
 
+/// The built-in settings with this latitude.
+pub fn at_latitude(deg: f32) -> Configuration {
+    Configuration { latitude_deg: Some(deg), ..Configuration::DEFAULT }
+}
+
 pub fn storing(configuration: &Configuration) -> Vec<u8> {
     let record = postcard::to_stdvec(configuration).expect("there is room");
     [&[0x2E, 0x01, 0x00, Configuration::VERSION][..], &record].concat()

@@ -2,7 +2,7 @@
 //! controller, and works on while it erases as far as the part lets it.
 
 use crate::common::{self, MS, START};
-use crate::service::{self, on_bus};
+use crate::service::{self, at_latitude, on_bus};
 use gyronet::can::DataFrame;
 use gyronet::model::{Blob, weights};
 use gyronet::service::message::{FlashState, Origin};
@@ -20,10 +20,6 @@ const STORE_TIME: Duration = Duration::from_millis(70);
 /// Half a period of the LED, which the image takes from its board time; the LED's pin.
 const BLINK: Duration = Duration::from_millis(512);
 const LED: u32 = 10;
-
-fn latitude(k: usize) -> Configuration {
-    Configuration { latitude_deg: Some(k as f32 * 0.125), ..Configuration::DEFAULT }
-}
 
 fn timed<T>(board: &mut Board, work: impl FnOnce(&mut Board) -> T) -> (T, Duration) {
     let begin = board.counts().time;
@@ -51,12 +47,13 @@ fn configuration_survives_restarts_while_sectors_fill_and_are_used_again() {
     const STORES: usize = 40;
     let Some(mut board) = common::started() else { return };
     let (mut erased, mut resets) = erased_and_reset(&mut board);
+    let numbered = |number: usize| at_latitude(number as f32 * 0.125);
     let mut stores = 0;
     while erased.len() < 4 {
         for _ in 0..STORES {
             stores += 1;
             let (stored, took) =
-                timed(&mut board, |board| on_bus(board).set_configuration(&latitude(stores)));
+                timed(&mut board, |board| on_bus(board).set_configuration(&numbered(stores)));
             stored.unwrap_or_else(|error| panic!("store {stores}: {error}"));
             let (sectors, causes) = erased_and_reset(&mut board);
             let least = ERASE * sectors.len() as u32;
@@ -65,7 +62,7 @@ fn configuration_survives_restarts_while_sectors_fill_and_are_used_again() {
             assert_eq!(causes, Vec::<String>::new(), "store {stores}");
         }
         service::restart(&mut board);
-        assert_eq!(service::configuration(&mut board), latitude(stores), "store {stores}");
+        assert_eq!(service::configuration(&mut board), numbered(stores), "store {stores}");
         let info = service::info(&mut board);
         assert_eq!((info.configuration, info.flash), (Origin::Stored, FlashState::Ready));
         // A start with little room left erases too.
@@ -85,11 +82,11 @@ fn stale_error_flags_of_the_flash_controller_refuse_no_store() {
     const ERRORS: u32 = 0xF2;
     let Some(mut board) = common::started() else { return };
     board.configure("FLASH.error_flags", ERRORS);
-    on_bus(&mut board).set_configuration(&latitude(3)).expect("it is stored");
+    on_bus(&mut board).set_configuration(&at_latitude(3.0)).expect("it is stored");
     board.configure("FLASH.error_flags", ERRORS);
-    on_bus(&mut board).set_configuration(&latitude(4)).expect("no sector is erased");
+    on_bus(&mut board).set_configuration(&at_latitude(4.0)).expect("no sector is erased");
     service::restart(&mut board);
-    assert_eq!(service::configuration(&mut board), latitude(4));
+    assert_eq!(service::configuration(&mut board), at_latitude(4.0));
 }
 
 #[test]
@@ -98,7 +95,7 @@ fn board_time_goes_on_over_an_erase() {
     board.configure("GPIOA.watch", vec![LED]);
     board.run(START + 2 * BLINK);
     // The first store erases a sector, whatever is in it.
-    let (stored, took) = timed(&mut board, |board| on_bus(board).set_configuration(&latitude(1)));
+    let (stored, took) = timed(&mut board, |board| on_bus(board).set_configuration(&at_latitude(1.0)));
     stored.expect("it is stored");
     assert!(took > ERASE);
     board.run(3 * BLINK);

@@ -66,7 +66,7 @@ fn a_damaged_configuration_and_a_damaged_slot_give_way_and_are_reported() {
 /// standstill holds as ever is in `library::service::configuration`.
 #[test]
 fn nothing_is_written_with_an_unlocked_flash_controller() {
-    let configuration = Configuration { latitude_deg: Some(48.1), ..Configuration::DEFAULT };
+    let configuration = service::at_latitude(48.1);
     let stored = Stored::default().record(&configuration);
     let unlocked = |board: &mut Board| board.configure("FLASH.starts_unlocked", true);
     let Some(mut started) = Started::with(&stored, unlocked) else { return };

@@ -4,7 +4,6 @@
 use crate::common::{self, MS, SAMPLE, START, drive, id, raw, stand};
 use crate::service;
 use embedded_can::Frame;
-use gyronet::store::Configuration;
 use gyronet_host_tests::board::{Board, Seen};
 use gyronet_host_tests::stored::other_weights;
 use gyronet_host_tests::tester::{Tester, frame, segment};
@@ -117,7 +116,7 @@ fn no_response_is_later_than_p2_without_a_wait() {
     let reads = reads.map(|row| bytes(&format!("22{}", row[0])));
     let others = "1003 3E00 1901FF 1902FF 190A 14FFFFFF 8502 8501 280301 280001 31010204 2701";
     let others = others.split(' ').map(bytes);
-    let stores = service::storing(&Configuration { latitude_deg: Some(48.0), ..Configuration::DEFAULT });
+    let stores = service::storing(&service::at_latitude(48.0));
     let file = other_weights(1);
     let download = [&[0x34, 0, 0x44, 0, 0, 0, 0][..], &(file.len() as u32).to_be_bytes()].concat();
     let last = [stores.clone(), stores, vec![0x10, 2], download, [&[0x36, 1], &file[..256]].concat()];
@@ -148,8 +147,7 @@ fn a_setting_that_is_stored_leaves_no_troubles() {
     board.run(Duration::from_secs(5));
     assert_eq!(timed(&mut board, &[0x19, 2, 8]).message, [0x59, 2, 0x7F], "a healthy board");
     assert_eq!(timed(&mut board, &[0x10, 3]).message[0], 0x50);
-    let configuration = Configuration { latitude_deg: Some(48.0), ..Configuration::DEFAULT };
-    assert_eq!(timed(&mut board, &service::storing(&configuration)).message, [0x6E, 1, 0]);
+    assert_eq!(timed(&mut board, &service::storing(&service::at_latitude(48.0))).message, [0x6E, 1, 0]);
     board.run(Duration::from_secs(3));
     assert!(board.events().iter().any(|event| event.kind == "flash_erase"));
     assert_eq!(timed(&mut board, &[0x19, 2, 8]).message, [0x59, 2, 0x7F]);

@@ -4,16 +4,14 @@
 use crate::common::{self, MS, START, id, resets, stand};
 use crate::service::{self, on_bus, on_line};
 use embedded_can::Frame;
-use gyronet::can::DataFrame;
 use gyronet::can::yaw::{Quality, RateMessage};
 use gyronet::model::blob::CRC;
 use gyronet::service::device::{Firmware, FirmwareState};
+use gyronet::store::Slot;
 use gyronet::store::firmware::{MAX_IMAGE, Trailer};
 use gyronet::store::layout::FLASH_BASE;
-use gyronet::store::{Configuration, Slot};
-use gyronet_host_tests::board::{At, Board, CanBus, PACKAGES, Seen};
+use gyronet_host_tests::board::{At, Board, PACKAGES};
 use gyronet_host_tests::{image, require};
-use gyronet_tools::client::bus::Bus;
 use gyronet_tools::client::device::update::{Update, update};
 use gyronet_tools::client::device::{Authority, Device};
 use std::time::Duration;
@@ -41,32 +39,11 @@ fn address(slot: Slot) -> u32 {
     FLASH_BASE + slot.firmware().start
 }
 
-/// A tester on CAN that also keeps what it sees.
-pub struct Recorder<'a>(pub CanBus<'a>, pub &'a mut Vec<(Duration, DataFrame)>);
-
-impl Bus for Recorder<'_> {
-    fn send(&mut self, frame: &DataFrame) -> std::io::Result<()> {
-        self.0.send(frame)
-    }
-
-    fn receive(&mut self) -> std::io::Result<Vec<DataFrame>> {
-        let seen: Vec<Seen> = self.0.observe();
-        let own = seen.into_iter().filter(|seen| seen.own).map(|seen| (seen.end, seen.frame));
-        let from = self.1.len();
-        self.1.extend(own);
-        Ok(self.1[from..].iter().map(|(_, frame)| *frame).collect())
-    }
-
-    fn now(&mut self) -> Duration {
-        self.0.now()
-    }
-}
-
 #[test]
 fn the_whole_image_is_updated_over_can_while_rates_are_sent() {
     let (Some(update_file), Some(mut board)) = (built(), common::boot()) else { return };
     board.run(START);
-    let configuration = Configuration { latitude_deg: Some(48.1), ..Configuration::DEFAULT };
+    let configuration = service::at_latitude(48.1);
     on_bus(&mut board).set_configuration(&configuration).expect("it stands");
     let key = service::lock(&mut board);
     assert_eq!(firmware(&mut board), (Some(Slot::A), FirmwareState::Confirmed));
@@ -74,7 +51,7 @@ fn the_whole_image_is_updated_over_can_while_rates_are_sent() {
     board.run(6 * S);
     let _ = (board.events(), board.can_frames());
     let (begin, mut log, mut at) = (board.counts().time, Vec::new(), 0);
-    let device = Device::new(Recorder(board.bus(), &mut log), "the virtual board");
+    let device = Device::new(board.logged_bus(&mut log), "the virtual board");
     let mut device = device.authorise(Authority::Key(key.clone()));
     let slot = update(&mut device, &update_file, |sent, _| at = sent)
         .unwrap_or_else(|error| panic!("after {at} bytes: {error}"));

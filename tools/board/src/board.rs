@@ -140,7 +140,12 @@ impl Board {
     }
 
     pub fn bus(&mut self) -> CanBus<'_> {
-        CanBus(self)
+        CanBus(self, None)
+    }
+
+    /// The bus for a tester, whose frames of the board are kept with the time of their end.
+    pub fn logged_bus<'a>(&'a mut self, log: &'a mut Vec<(Duration, DataFrame)>) -> CanBus<'a> {
+        CanBus(self, Some(log))
     }
 
     pub fn line(&mut self, usart: usize) -> Line<'_> {

@@ -1,6 +1,6 @@
 //! The virtual board's CAN bus, for a tester: receiving lets board time pass.
 
-use super::{Board, Seen};
+use super::Board;
 use gyronet::can::DataFrame;
 use gyronet_tools::client::bus::Bus;
 use std::io::Result;
@@ -8,16 +8,9 @@ use std::time::Duration;
 
 const TURN: Duration = Duration::from_millis(1);
 
+/// A board's bus, and where the frames of the board are kept.
 #[derive(Debug)]
-pub struct CanBus<'a>(pub(super) &'a mut Board);
-
-impl CanBus<'_> {
-    /// As receiving does, with the frames of other nodes.
-    pub fn observe(&mut self) -> Vec<Seen> {
-        self.0.run(TURN);
-        self.0.bus_log()
-    }
-}
+pub struct CanBus<'a>(pub(super) &'a mut Board, pub(super) Option<&'a mut Vec<(Duration, DataFrame)>>);
 
 impl Bus for CanBus<'_> {
     fn send(&mut self, frame: &DataFrame) -> Result<()> {
@@ -27,7 +20,11 @@ impl Bus for CanBus<'_> {
 
     fn receive(&mut self) -> Result<Vec<DataFrame>> {
         self.0.run(TURN);
-        Ok(self.0.can_frames().into_iter().map(|(_, frame)| frame).collect())
+        let frames = self.0.can_frames();
+        if let Some(log) = &mut self.1 {
+            log.extend(&frames);
+        }
+        Ok(frames.into_iter().map(|(_, frame)| frame).collect())
     }
 
     fn now(&mut self) -> Duration {
