@@ -2,7 +2,7 @@
 //!
 //! The filter is a sinc with a Hamming window. Its delay of half its length is compensated, as that of the delayed
 //! rate is. So it shows what smoothing alone gains with the same inputs and no more delay. Length and corner
-//! frequency are the best on the training drives.
+//! frequency were the best of a grid on the training drives.
 
 use gyronet::sample::RATE_HZ;
 use std::collections::VecDeque;

@@ -30,11 +30,12 @@ use std::rc::Rc;
 pub const EVERY_S: usize = 2;
 /// Seconds of course before a start, one set of rows each.
 pub const AFTER_S: [usize; 2] = [60, 20];
-/// Longest time from one course to the next of a vehicle that drives with a course, s.
+/// Longest time from one course to the next of a vehicle that drives with a course, and from one GNSS speed to the next, s.
 const APART_S: f64 = 2.1;
 /// Samples over whose median the reference is taken.
 const MEDIAN: usize = 3 * SECOND;
 const SECOND: usize = RATE_HZ as usize;
+const MINUTE: usize = 60 * SECOND;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Outage {
@@ -47,8 +48,10 @@ pub struct Outage {
     /// and get the gyro's.
     pub is_rested: bool,
     pub heading: ByMethod<f64>,
-    /// Distance by the wheels, m, and what the errors of the heading move its end by, m.
+    /// Distance by the wheels, or by GNSS of a drive without them, m, and what the errors of the heading move its end by, m.
     pub position: Option<(f64, ByMethod<f64>)>,
+    /// The error that the board expects of its heading, rad, over whole minutes: the sum of the minutes' doubts.
+    pub expected: Option<f64>,
 }
 
 /// Returns why no outage has an error: what a drive lacks for one of so many seconds.
@@ -73,7 +76,7 @@ impl WindowNetwork for Shared<'_> {
 }
 
 /// Runs every method through the outages of a drive, which may begin in motion; also returns the time driven with a
-/// course, s. `ours` configures the boards with the course.
+/// course, s. `ours` configures the boards with the course, and its zero-rate updates those without.
 pub fn run(
     drive: &Drive<'_>,
     network: &mut dyn WindowNetwork,
@@ -124,6 +127,8 @@ struct Race<'a> {
     ekf: ekf::Filter,
     vqf: vqf::Heading,
     speeds: Option<Speeds>,
+    /// Newest speed by GNSS, m/s, and its time, us.
+    gnss_speed: Option<(f64, u64)>,
     /// Time of the newest course, us, and the time driven with one, s.
     newest: Option<u64>,
     driven_s: f64,
@@ -153,6 +158,8 @@ struct Running<'a> {
     /// Known once the boards give out the step of the start.
     begun: Option<Begun>,
     path: Path,
+    /// The sum of the doubts of its minutes, rad, unless one is unknown.
+    doubts: Option<f64>,
 }
 
 /// The copy of the filter, and the gyro's sum less the true heading at the start.
@@ -217,15 +224,17 @@ impl<'a> Race<'a> {
         starts: Starts,
         ours: PipelineConfig,
     ) -> Self {
+        let classical = PipelineConfig { zero_rate: ours.zero_rate, ..PipelineConfig::DEFAULT };
         let no_model = Board::new(silent(ours), drive.wheels(), Uncorrected).moving(true);
         let model = Board::new(silent(ours), drive.wheels(), network).moving(true);
         Self {
             lengths: lengths_s.to_vec(),
             boards: Boards { no_model, model },
-            zero_rate: Board::new(silent(PipelineConfig::DEFAULT), drive.wheels(), Uncorrected).moving(false),
+            zero_rate: Board::new(silent(classical), drive.wheels(), Uncorrected).moving(false),
             ekf: ekf::Filter::default(),
             vqf: vqf::Heading::new(vqf::on_a_vehicle()),
             speeds: drive.speeds(),
+            gnss_speed: None,
             newest: None,
             driven_s: 0.0,
             static_bias: None,
@@ -255,7 +264,14 @@ impl<'a> Race<'a> {
         };
         if starts {
             let (boards, driven_s) = (self.boards.clone(), self.driven_s);
-            self.running.push(Running { start: at, driven_s, boards, begun: None, path: Path::default() });
+            self.running.push(Running {
+                start: at,
+                driven_s,
+                boards,
+                begun: None,
+                path: Path::default(),
+                doubts: Some(0.0),
+            });
         }
     }
 
@@ -301,7 +317,11 @@ impl<'a> Race<'a> {
         if let Some(heading) = &row.heading {
             self.ekf.course(heading);
         }
-        let speed = self.speeds.as_mut().map(|speeds| speeds.next(row));
+        let now = row.sample.time.0;
+        self.gnss_speed = row.speed.map(|speed| (speed, now)).or(self.gnss_speed);
+        let by_gnss = self.gnss_speed.filter(|(_, at)| (now - at) as f64 * 1e-6 < APART_S);
+        let speed = self.speeds.as_mut().map(|speeds| speeds.next(row)).or(by_gnss.map(|(speed, _)| speed));
+        let has_speed = self.speeds.is_some() || self.gnss_speed.is_some();
         let (median, lengths, found) = (self.reference.median(), &self.lengths, &mut self.found);
         let mut trace = matches!(self.starts, Starts::At(_)).then_some(&mut self.trace);
         let mut copies = copies.into_iter();
@@ -326,15 +346,21 @@ impl<'a> Race<'a> {
             ];
             outage.path.add(rates, gyro, median.map_or(0.0, |median| median - begun.median), speed);
             let steps = own.row - outage.start;
+            let is_minute = steps.is_multiple_of(MINUTE);
+            if is_minute {
+                let doubt = outage.boards.model.coprocessor().pipeline().status(None).doubt;
+                let doubt = doubt.map(|hundredths| (f64::from(hundredths) / 100.0).to_radians());
+                outage.doubts = outage.doubts.zip(doubt).map(|(before, doubt)| before + doubt);
+            }
             if let Some(trace) = &mut trace
                 && steps.is_multiple_of(SECOND / 2)
             {
-                trace.push(outage.path.point(speed.is_some()));
+                trace.push(outage.path.point(has_speed));
             }
             if let Some(seconds) = lengths.iter().copied().find(|seconds| seconds * SECOND == steps)
                 && median.is_some()
             {
-                let Point { heading, position } = outage.path.point(speed.is_some());
+                let Point { heading, position } = outage.path.point(has_speed);
                 found.push(Outage {
                     driven_s: outage.driven_s,
                     seconds,
@@ -342,6 +368,7 @@ impl<'a> Race<'a> {
                     is_rested: begun.is_rested,
                     heading: heading.map(|off| wrap(off).abs()),
                     position,
+                    expected: outage.doubts.filter(|_| is_minute),
                 });
             }
             lengths.iter().any(|seconds| seconds * SECOND > steps)

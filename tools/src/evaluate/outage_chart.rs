@@ -183,7 +183,8 @@ mod tests {
     fn outage(seconds: usize, error: f64) -> Outage {
         let heading = std::array::from_fn(|_| error);
         let position = Some((500.0, std::array::from_fn(|_| 3.0)));
-        Outage { driven_s: 70.0, seconds, start_s: 80.0, is_rested: true, heading, position }
+        let expected = None;
+        Outage { driven_s: 70.0, seconds, start_s: 80.0, is_rested: true, heading, position, expected }
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! The path of every method since the start of an outage, from its rates and the speed of the wheels.
+//! The path of every method since the start of an outage, from its rates and the speed of the wheels, or by GNSS.
 
 use crate::drive::DT;
 use crate::evaluate::methods::Method;
@@ -12,7 +12,7 @@ pub type ByMethod<T> = [T; METHODS.len()];
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Point {
     pub heading: ByMethod<f64>,
-    /// The distance driven, and that of each method's place from the reference's, m; absent without wheels.
+    /// The distance driven, and that of each method's place from the reference's, m; absent without a speed.
     pub position: Option<(f64, ByMethod<f64>)>,
 }
 

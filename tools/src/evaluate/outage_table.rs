@@ -34,10 +34,26 @@ pub struct Figures {
     pub rested_starts: usize,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rested_heading_deg: Option<Spread>,
-    /// What the heading moves the end of the path by wheels, m; absent without wheels.
+    /// What the heading moves the end of the path by wheels or GNSS speed, m, and the same in % of the distance, of a metre at least.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub position_m: Option<Spread>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub position_percent: Option<Spread>,
+    /// Share of the starts whose error is inside the one that the board expects; of its own rate, over whole minutes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub inside: Option<f64>,
 }
+
+impl Figures {
+    /// Median, 90 % and worst of heading, position and its share of the distance, as far as they are known.
+    fn columns(&self) -> Vec<f64> {
+        let spreads = [Some(self.heading_deg), self.position_m, self.position_percent].into_iter().flatten();
+        spreads.flat_map(|Spread { median, p90, worst }| [median, p90, worst]).collect()
+    }
+}
+
+/// The methods that a user has without gyronet.
+const CLASSICAL: [Method; 4] = [Method::STATIC, Method::STATIC_ZERO_RATE, Method::VQF, Method::EKF];
 
 pub type ByLength = BTreeMap<usize, BTreeMap<&'static str, Figures>>;
 
@@ -70,7 +86,11 @@ impl Outages {
                             heading_deg,
                             rested_starts: rested.clone().count(),
                             rested_heading_deg: Spread::of(rested.map(heading)),
-                            position_m: Spread::of(moved.map(|(_, ends)| ends[k])),
+                            position_m: Spread::of(moved.clone().map(|(_, ends)| ends[k])),
+                            position_percent: Spread::of(
+                                moved.map(|(way, ends)| 100.0 * ends[k] / way.max(1.0)),
+                            ),
+                            inside: (*method == Method::DELAYED).then(|| inside(chosen.clone(), k)).flatten(),
                         };
                         (method.key, figures)
                     }));
@@ -80,6 +100,13 @@ impl Outages {
         });
         Self { set: set.to_owned(), outage, outage_after_20_s }
     }
+}
+
+/// Returns the share of outages whose error is inside the expected one; `None` without one.
+fn inside<'a>(outages: impl Iterator<Item = &'a Outage>, method: usize) -> Option<f64> {
+    let inside: Vec<bool> =
+        outages.filter_map(|one| one.expected.map(|expected| one.heading[method] <= expected)).collect();
+    (!inside.is_empty()).then(|| inside.iter().filter(|is| **is).count() as f64 / inside.len() as f64)
 }
 
 impl fmt::Display for Outages {
@@ -103,31 +130,60 @@ impl fmt::Display for Outages {
                     self.set
                 )?;
                 let wheels = methods.values().any(|figures| figures.position_m.is_some());
-                let position = if wheels { "position, m" } else { "position: no wheels" };
-                writeln!(f, "  {:<26}{:>25}{position:>25}", "median, 90 %, worst", "heading, deg")?;
+                let position = if wheels { "position, m" } else { "position: no speed" };
+                let percent = if wheels { "% of the distance" } else { "" };
+                let head = format!(
+                    "  {:<26}{:>25}{position:>25}{percent:>25}",
+                    "median, 90 %, worst", "heading, deg"
+                );
+                writeln!(f, "{}", head.trim_end())?;
                 let median = |method: Method| Some(methods.get(method.key)?.heading_deg.median);
                 let has_failed = |method| median(method) > median(Method::STATIC).map(|still| FAILED * still);
+                let mut best: Option<Vec<f64>> = None;
                 for method in METHODS {
                     let Some(figures) = methods.get(method.key) else { continue };
                     let mark = if has_failed(method) { " ?" } else { "" };
-                    write!(f, "  {:<26}", format!("{}{mark}", method.name))?;
-                    for Spread { median, p90, worst } in
-                        [Some(figures.heading_deg), figures.position_m].into_iter().flatten()
-                    {
-                        // Of fewer starts it is the worst one.
-                        let p90 = if figures.starts < 10 { "-".into() } else { format!("{p90:.2}") };
-                        write!(f, "{median:>9.2}{p90:>8}{worst:>8.2}")?;
+                    let columns = figures.columns();
+                    write_row(f, &format!("{}{mark}", method.name), &columns, figures.starts)?;
+                    if CLASSICAL.contains(&method) {
+                        let least = best.get_or_insert_with(|| columns.clone());
+                        least.iter_mut().zip(columns).for_each(|(least, own)| *least = least.min(own));
                     }
-                    writeln!(f)?;
+                    if method == Method::EKF {
+                        write_row(
+                            f,
+                            "best of these by column",
+                            best.as_deref().unwrap_or(&[]),
+                            figures.starts,
+                        )?;
+                    }
                 }
                 if METHODS.into_iter().any(has_failed) {
                     writeln!(f, "  ? failed: {FAILED} times static initialisation's median error")?;
+                }
+                if let Some(inside) = methods.get(Method::DELAYED.key).and_then(|figures| figures.inside) {
+                    writeln!(
+                        f,
+                        "  gyronet's error is inside the one that it expects (0x1A3) at {:.0} % of the starts",
+                        100.0 * inside
+                    )?;
                 }
                 write_rested(f, methods)?;
             }
         }
         Ok(())
     }
+}
+
+fn write_row(f: &mut fmt::Formatter<'_>, name: &str, columns: &[f64], starts: usize) -> fmt::Result {
+    write!(f, "  {name:<26}")?;
+    for spread in columns.chunks(3) {
+        let [median, p90, worst] = [0, 1, 2].map(|at| spread.get(at).copied().unwrap_or_default());
+        // Of fewer starts it is the worst one.
+        let p90 = if starts < 10 { "-".into() } else { format!("{p90:.2}") };
+        write!(f, "{median:>9.2}{p90:>8}{worst:>8.2}")?;
+    }
+    writeln!(f)
 }
 
 /// Says at how many starts the methods that need a rest had none, and how the others went.
@@ -164,7 +220,8 @@ mod tests {
             start_s: 0.0,
             is_rested: seconds == 60 && driven_s > 80.0,
             heading: std::array::from_fn(|k| error * (k + 1) as f64),
-            position: None,
+            position: (seconds == 30).then(|| (200.0, std::array::from_fn(|k| (6 - k) as f64))),
+            expected: (seconds == 60 && driven_s > 80.0).then_some(7.0 * error).or(Some(0.0)),
         };
         let all =
             [outage(30.0, 60, 0.3), outage(70.0, 60, 0.1), outage(90.0, 60, 0.2), outage(90.0, 30, 0.4)];
@@ -175,7 +232,12 @@ mod tests {
         assert_eq!(of(&table.outage_after_20_s, 60).starts, 3);
         let text = table.to_string();
         assert!(text.starts_with("x, 1 drive: 30 s without GNSS after 60 s with it, 1 start\n"), "{text}");
-        assert!(text.contains("position: no wheels"), "{text}");
+        assert!(text.contains("position: no speed"), "{text}");
+        for share in ["(0x1A3) at 50 % of the starts", "(0x1A3) at 33 % of the starts"] {
+            assert_eq!(text.matches(share).count(), 1, "of two and of three starts one: {text}");
+        }
+        let columns = [22.92, 3.0, 1.5].map(|value| format!("{value:9.2}       -{value:8.2}")).concat();
+        assert!(text.contains(&format!("  best of these by column   {columns}\n")), "{text}");
         assert!(
             text.contains("x: 90 s without GNSS after 60 s with it: no start; it needs 60 s with"),
             "{text}"
