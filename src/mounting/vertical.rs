@@ -38,8 +38,11 @@ const MOST: f32 = 3_283.0;
 /// Least rate of a turn, rad/s, as the mean of a second, and its least angle, rad.
 const TURNING: f32 = 0.05;
 const LEAST_TURN: f32 = 0.5;
-/// Samples of a standstill that are averaged: 3 s; and those after which the next one is on another street: 10 s.
+/// Samples after which a standstill counts, 3 s, and those of them after which the force is averaged: passive wheel sensors
+/// show zero while the vehicle still brakes, and then it rocks.
 const REST: u32 = 3 * RATE_HZ;
+const SETTLED: u32 = REST / 2;
+/// Samples after which the next standstill is on another street: 10 s.
 const APART: u32 = 10 * RATE_HZ;
 /// Sigma of a vertical that is known well, deg.
 const FINE_DEG: f32 = 3.0;
@@ -191,10 +194,13 @@ impl VerticalEstimator {
     pub fn add(&mut self, force: &[SpecificForce; 3], rate: &[AngularRate; 3], stands: bool) -> bool {
         if stands {
             self.stood = self.stood.saturating_add(1);
-            self.force.iter_mut().zip(force).for_each(|(sum, axis)| *sum += i64::from(axis.0));
+            if self.stood > SETTLED {
+                self.force.iter_mut().zip(force).for_each(|(sum, axis)| *sum += i64::from(axis.0));
+            }
             if self.stood == REST {
                 if self.away >= APART {
-                    self.rest(&self.force.map(|sum| SpecificForce((sum / i64::from(REST)) as i32)));
+                    let samples = i64::from(REST - SETTLED);
+                    self.rest(&self.force.map(|sum| SpecificForce((sum / samples) as i32)));
                 }
                 self.away = 0;
             }
@@ -345,6 +351,15 @@ mod tests {
             run(&mut estimator, 20, NONE, 0.0, false);
         }
         assert!(estimator.known().up()[1].asin().to_degrees() < -5.0);
+    }
+
+    #[test]
+    fn a_vehicle_that_brakes_while_its_wheels_show_zero_is_not_tilted() {
+        let mut estimator = VerticalEstimator::new(Vertical::UNKNOWN);
+        run(&mut estimator, 1, [8.0, 0.0], 0.0, true);
+        run(&mut estimator, 3, NONE, 0.0, true);
+        let [x, y, _] = estimator.known().up();
+        assert!(estimator.known().information > 0.0 && x.abs().max(y.abs()) < 1e-4, "{x} {y}");
     }
 
     #[test]
