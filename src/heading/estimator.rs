@@ -9,9 +9,10 @@
 //! - the gain is learnt only where the vehicle turns both ways: in a steady circle a growing slip looks like a gain;
 //! - a course far from the expected heading is refused, and one at some distance has bounded influence. After
 //!   [`PATIENCE`] without a match the heading starts again from the course; bias and gain are again those of the
-//!   newest of [`MATCHES`] courses that matched well, unless the vehicle has stood since. Where two such times show
-//!   the same drift, the bias becomes uncertain by it. Courses that keep failing teach only a heading until they have
-//!   matched for [`TRUST`];
+//!   newest course that matched well after [`CALM`], unless the vehicle has stood since. Where two such times show
+//!   the same drift, the bias becomes uncertain by it. A refused course leaves those after it only the heading to teach:
+//!   for a while before the bias is known ([`COST`]), then until all have matched for [`CALM`]. Courses that keep failing do,
+//!   until they have matched for [`TRUST`];
 //! - after a halt, and at low speed, a course may have jumped by half a turn, because the vehicle goes backwards.
 
 use super::filter::{BIAS, Filter, GAIN, HEADING, LAG, Measured, wrap};
@@ -82,8 +83,11 @@ const PATIENCE: u32 = 10 * RATE_HZ;
 /// Time with courses that match after which failures are forgotten, samples; and so many failures are too many.
 const TRUST: u32 = 60 * RATE_HZ;
 const FAILURES: u8 = 3;
-/// Matching courses in a row that teach again after a failure.
-const MATCHES: u8 = 10;
+/// Time with courses that match, one and all, after which they teach again once one was refused: reflections off houses last
+/// for seconds, and the courses that match by chance meanwhile are off to the same side; samples.
+const CALM: u32 = 10 * RATE_HZ;
+/// Time of matching courses that one refused course costs before the bias is known, over the time since the one before it.
+const COST: u32 = 2;
 /// Drift of the heading by a wrong bias, rad/s, where one is noticed, rad, and how alike two are: a share, rad/s.
 const DRIFT: core::ops::Range<f32> = 2e-3..0.03;
 const NOTICED: f32 = 0.3;
@@ -145,9 +149,16 @@ struct Failing {
     /// Times in a row that the heading started again, and the tick of the newest one.
     times: u8,
     trusted: u32,
-    matches: u8,
-    /// Bias and gain with their variances, before the courses that may be false.
-    before: Option<[f32; 4]>,
+    /// Samples with courses that matched since the newest refusal, of each course a second at most.
+    calm: u32,
+    /// Courses have matched for most of [`TRUST`]: those that drift away later are false, not the bias.
+    is_confirmed: bool,
+    /// Samples with matching courses that a bias which is not known yet still waits for.
+    owed: u32,
+    /// Bias and gain with their variances, before the courses that may be false: the newest, and those of [`CALM`] before
+    /// it or more, because false ones may match at first. Then the tick of the newest.
+    before: [Option<[f32; 4]>; 2],
+    kept: u32,
 }
 
 impl Failing {
@@ -239,7 +250,17 @@ impl Estimator {
             ways: [0.0; 2],
             learns_gain: false,
             is_backwards: false,
-            failing: Failing { since: None, drift: None, times: 0, trusted: 0, matches: 0, before: None },
+            failing: Failing {
+                since: None,
+                drift: None,
+                times: 0,
+                trusted: 0,
+                calm: CALM,
+                owed: 0,
+                is_confirmed: false,
+                before: [None; 2],
+                kept: 0,
+            },
             refusal: None,
             counters: CourseState::START.counters,
         }
@@ -308,7 +329,9 @@ impl Estimator {
     fn walk(&mut self, filter: &mut Filter, turned: f32, stands: bool) {
         let [heading, lag] = self.config.walks.map(|walk| walk * walk * BLOCK_SECONDS);
         filter.turn(turned, BLOCK_SECONDS, stands);
-        self.failing.before.take_if(|_| stands);
+        if stands {
+            self.failing.before = [None; 2];
+        }
         filter.put_variance::<LAG>((filter.variance::<LAG>() + lag).min(1.0));
         filter.put_variance::<HEADING>(filter.variance::<HEADING>() + heading);
         let driven = turned - filter.get::<BIAS>() * BLOCK_SECONDS;
@@ -341,7 +364,7 @@ impl Estimator {
             }
             let driving = self.config.driving;
             filter.put_variance::<BIAS>(filter.variance::<BIAS>() + driving * driving);
-            self.failing.before = Some(learnt(filter));
+            self.failing.before = [Some(learnt(filter)); 2];
         }
         let paused = self.last.map_or(u32::MAX, |last| arrived.tick.wrapping_sub(last));
         self.last = Some(arrived.tick);
@@ -373,14 +396,17 @@ impl Estimator {
         let innovation = filter.innovation(&measured);
         let ratio = libm::fabsf(off) / sqrt(innovation);
         if ratio.is_nan() || ratio > REFUSED {
-            self.failing.matches = 0;
+            self.failing.is_confirmed |= self.failing.calm >= TRUST;
+            self.failing.calm = 0;
+            self.failing.owed = (self.failing.owed + COST * paused.min(RATE_HZ)).min(CALM);
             let (since, _) = *self.failing.since.get_or_insert((arrived.tick, off));
             if arrived.tick.wrapping_sub(since) > PATIENCE {
-                if let Some([bias, bias_variance, gain, gain_variance]) = self.failing.before.take() {
+                if let Some([bias, bias_variance, gain, gain_variance]) = self.failing.before[1].take() {
                     filter.restart::<BIAS>(bias, bias_variance);
                     filter.restart::<GAIN>(gain, gain_variance);
                 }
-                if let Some(drift) = self.failing.start(arrived.tick, off) {
+                let drift = self.failing.start(arrived.tick, off);
+                if let Some(drift) = drift.filter(|_| !self.failing.is_confirmed) {
                     filter.put_variance::<BIAS>(filter.variance::<BIAS>() + drift * drift);
                     self.failing = Failing { times: 0, drift: None, ..self.failing };
                 }
@@ -395,22 +421,36 @@ impl Estimator {
             self.failing = Failing { times: 0, drift: None, ..self.failing };
         }
         self.failing.since = None;
-        self.failing.matches = self.failing.matches.saturating_add(1);
-        let Failing { times, matches, .. } = self.failing;
-        let is_doubted = times >= FAILURES || times > 0 && matches < MATCHES;
-        filter.course(&measured, [is_doubted, is_doubted || !self.learns_gain]);
+        // False ones that drift match for a while after the heading has started again.
+        if self.failing.times == 0 || ratio < WELL {
+            self.failing.calm = self.failing.calm.saturating_add(paused.min(RATE_HZ));
+        }
+        let is_calm = self.failing.calm >= CALM;
+        // A bias that is not known yet has less to lose, and a start in motion waits for it.
+        let is_known = filter.variance::<BIAS>() <= FINE_BIAS * FINE_BIAS;
+        let holds = if is_known { !is_calm } else { self.failing.owed > 0 };
+        self.failing.owed = self.failing.owed.saturating_sub(paused.min(RATE_HZ));
+        let has_failed = self.failing.times >= FAILURES;
+        filter.course(&measured, [has_failed || holds, has_failed || !is_calm || !self.learns_gain]);
         let [least, most] = LAGS;
         filter.put::<LAG>(filter.get::<LAG>().max(least).min(most));
         filter.put::<GAIN>(filter.get::<GAIN>().clamp(-MAX_GAIN, MAX_GAIN));
         self.used = Some(arrived.tick);
-        if ratio < WELL && matches >= MATCHES {
-            self.failing.before = Some(learnt(filter));
+        if ratio < WELL && is_calm && arrived.tick.wrapping_sub(self.failing.kept) >= CALM {
+            let now = Some(learnt(filter));
+            self.failing.before = [now, self.failing.before[0].or(now)];
+            self.failing.kept = arrived.tick;
         }
         Ok(())
     }
 
     pub(crate) fn has_begun(&self) -> bool {
         self.used.is_some()
+    }
+
+    /// Begins with a bias of zero, from which the one so far has been taken off: what was learnt before is another's.
+    pub(crate) fn refer(&mut self) {
+        self.failing.before = [None; 2];
     }
 
     /// Returns whether the bias is known well enough to use the rate.

@@ -2,6 +2,7 @@
 
 use crate::bias::{EarthRate, StaticConfig, ThermalBias, ZeroRateConfig};
 use crate::compensate::CompensateConfig;
+use crate::fog::FogErrors;
 use crate::heading::{CourseConfig, Gain};
 use crate::health::slow::Knowledge;
 use crate::mounting::{GyroMap, Rotation, Vertical};
@@ -55,4 +56,21 @@ impl PipelineConfig {
         compensate: CompensateConfig::DEFAULT,
         uncertainty: UncertaintyConfig::DEFAULT,
     };
+
+    /// The same for an inertial unit with an optical gyro, by the gyro's data sheet: with the numbers of a MEMS part courses
+    /// would move a bias that a standstill has shown better. The bias walks at least as far as the sheet's in an hour, and
+    /// neither a standstill nor the road changes it by more. The expected error stays that of a MEMS part.
+    #[must_use]
+    pub fn with_gyro(self, errors: &FogErrors) -> Self {
+        let FogErrors { angle_walk, bias, bias_walk, scale } = *errors;
+        let zero_rate = self.zero_rate.map(|own| ZeroRateConfig {
+            // Static initialisation takes three seconds.
+            initial: 0.577 * angle_walk,
+            walk: bias_walk.max(bias / 60.0),
+            standstill: bias,
+            noise: angle_walk,
+            ..own
+        });
+        Self { zero_rate, course: CourseConfig { driving: bias, gain: scale, ..self.course }, ..self }
+    }
 }

@@ -78,6 +78,7 @@ impl Pipeline {
         let [x, y] = start.mean();
         let z = AngularRate(libm::roundf(filter.get::<BIAS>() * AngularRate::PER_RAD_PER_SEC) as i32);
         filter.put::<BIAS>(0.0);
+        course.refer();
         self.state.sensor_bias.refer();
         let mounted = self.config.vertical.turned(&self.config.mounting);
         let (known, levelling) =
