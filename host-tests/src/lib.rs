@@ -7,6 +7,7 @@ pub mod entrance;
 pub mod flash;
 pub mod gnss;
 pub mod golden;
+pub mod kingston;
 pub mod models;
 pub mod noise;
 pub mod packing;

@@ -71,7 +71,7 @@ impl Bus for Wire {
 }
 
 pub struct Board {
-    coprocessor: Box<Coprocessor>,
+    pub coprocessor: Box<Coprocessor>,
     device: Box<Device<Region, Region>>,
     network: GyroNet<'static>,
     line: Line,

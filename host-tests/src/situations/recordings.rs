@@ -6,11 +6,12 @@ use super::receiver::{INERTIAL, Receiver};
 use super::ride::Travelled;
 use super::sensor::mti;
 use super::vehicle::{Part, STEP};
+use crate::recordings::drives;
 use gyronet::store::Learned;
 use gyronet::units::Micros;
 use gyronet_tools::drive::stream::Recording;
 use std::f64::consts::{PI, TAU};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// The references' errors by folder, from the notes of their recordings: a gyro with its noise in a second and its bias,
 /// a ring laser, the course of an antenna that swings in turns, an inertial system of the same unit, courses of GNSS and RTK.
@@ -29,10 +30,7 @@ const LONGEST: f64 = 1.5;
 pub fn judged(folder: &Path, wanted: &str) -> Vec<(String, Outcome)> {
     let mut judged = Vec::new();
     for (name, reference) in REFERENCES {
-        let Ok(files) = std::fs::read_dir(folder.join(name)) else { continue };
-        let mut files: Vec<PathBuf> = files.flatten().map(|file| file.path()).collect();
-        files.sort();
-        for path in files.into_iter().filter(|path| path.extension().is_some_and(|ending| ending == "csv")) {
+        for path in drives(&folder.join(name)) {
             let title = format!("{name}/{}", path.file_stem().unwrap_or_default().display());
             if title.contains(wanted) {
                 let recording = Recording::read(&path).unwrap_or_else(|error| panic!("{error}"));

@@ -3,14 +3,14 @@
 
 use gyronet::bias::Latitude;
 use gyronet::coprocessor::{Config, Coprocessor};
-use gyronet::fog::{FogConfig, FogErrors};
+use gyronet::fog::FogConfig;
 use gyronet::sample::FogSample;
 use gyronet::units::{Angle, Micros};
+use gyronet_host_tests::kingston::{HG1700, at, table};
 use gyronet_host_tests::recordings;
 use gyronet_host_tests::sent::Sent;
 use gyronet_paper::simulate::world::EARTH_RATE;
 use gyronet_tools::drive::wheel_frames;
-use std::path::Path;
 
 /// The last part of the drive, which nothing has been chosen on.
 const TESTED: f64 = 0.4;
@@ -18,26 +18,6 @@ const TESTED: f64 = 0.4;
 const FINAL: f64 = 0.003;
 /// One row of the gyro is so many steps of the board.
 const STEPS: usize = 10;
-/// 1 deg/h in rad/s.
-const DEG_PER_HOUR: f32 = std::f32::consts::PI / 180.0 / 3600.0;
-/// Honeywell HG1700 by its brochure: a bias of 1 deg/h, 1 sigma, and 0.125 deg per square root of an hour. It says nothing
-/// of a walk of the bias, and 150 ppm.
-const HG1700: FogErrors =
-    FogErrors { angle_walk: 0.125 * 60.0 * DEG_PER_HOUR, bias: DEG_PER_HOUR, bias_walk: 0.0, scale: 150e-6 };
-
-fn table(path: &Path) -> Vec<Vec<f64>> {
-    let text = std::fs::read_to_string(path).expect("a file");
-    let row = |line: &str| line.split(',').map(|field| field.parse().expect("a number")).collect();
-    text.lines().skip(1).map(row).collect()
-}
-
-/// The value of a column at a time, between the rows around it.
-fn at(table: &[Vec<f64>], column: usize, time: f64) -> f64 {
-    let after = table.partition_point(|row| row[0] < time).clamp(1, table.len() - 1);
-    let [before, after] = [&table[after - 1], &table[after]];
-    let share = ((time - before[0]) / (after[0] - before[0])).clamp(0.0, 1.0);
-    before[column] + share * (after[column] - before[column])
-}
 
 /// Yaw by the board after each row of the gyro, rad.
 fn yaw(gyro: &[Vec<f64>], speed: &[Vec<f64>], latitude: f64) -> Vec<f64> {

@@ -32,12 +32,18 @@ pub fn trial(number: u32) -> Option<PathBuf> {
 pub fn with_speed() -> Option<Vec<PathBuf>> {
     found("wid_car")?;
     let sets = ["wid_car", "real_car", "rc_car", "utv", "truck", "car_mti710"];
-    let folders = sets.map(|set| folder().join(set));
-    let files = folders.iter().filter_map(|set| std::fs::read_dir(set).ok()).flatten().flatten();
+    let mut paths: Vec<_> = sets.into_iter().flat_map(|set| drives(&folder().join(set))).collect();
+    paths.sort();
+    Some(paths)
+}
+
+/// The drives in a folder, in order; none without it.
+pub fn drives(folder: &Path) -> Vec<PathBuf> {
+    let files = std::fs::read_dir(folder).into_iter().flatten().flatten();
     let is_drive = |path: &PathBuf| path.extension().is_some_and(|e| e == "csv");
     let mut paths: Vec<_> = files.map(|file| file.path()).filter(is_drive).collect();
     paths.sort();
-    Some(paths)
+    paths
 }
 
 pub fn trials(numbers: &[u32]) -> Option<Vec<PathBuf>> {
