@@ -11,8 +11,8 @@
 //!   [`PATIENCE`] without a match the heading starts again from the course; bias and gain are again those of the
 //!   newest course that matched well after [`CALM`], unless the vehicle has stood since. Where two such times show
 //!   the same drift, the bias becomes uncertain by it. A refused course leaves those after it only the heading to teach:
-//!   for a while before the bias is known ([`COST`]), then until all have matched for [`CALM`]. Courses that keep failing do,
-//!   until they have matched for [`TRUST`];
+//!   for a while before the bias is known ([`COST`]), then until all have matched for [`CALM`]. Courses that keep failing
+//!   teach only the heading until they have matched for [`TRUST`];
 //! - after a halt, and at low speed, a course may have jumped by half a turn, because the vehicle goes backwards.
 
 use super::filter::{BIAS, Filter, GAIN, HEADING, LAG, Measured, wrap};
@@ -83,10 +83,10 @@ const PATIENCE: u32 = 10 * RATE_HZ;
 /// Time with courses that match after which failures are forgotten, samples; and so many failures are too many.
 const TRUST: u32 = 60 * RATE_HZ;
 const FAILURES: u8 = 3;
-/// Time with courses that match, one and all, after which they teach again once one was refused: reflections off houses last
-/// for seconds, and the courses that match by chance meanwhile are off to the same side; samples.
+/// Samples with matching courses only, after which courses teach the bias again once one was refused: reflections off houses
+/// last for seconds, and the courses that match by chance meanwhile are off to the same side.
 const CALM: u32 = 10 * RATE_HZ;
-/// Time of matching courses that one refused course costs before the bias is known, over the time since the one before it.
+/// Before the bias is known, a refused course suspends its learning for this many times the interval of the courses.
 const COST: u32 = 2;
 /// Drift of the heading by a wrong bias, rad/s, where one is noticed, rad, and how alike two are: a share, rad/s.
 const DRIFT: core::ops::Range<f32> = 2e-3..0.03;
@@ -149,11 +149,11 @@ struct Failing {
     /// Times in a row that the heading started again, and the tick of the newest one.
     times: u8,
     trusted: u32,
-    /// Samples with courses that matched since the newest refusal, of each course a second at most.
+    /// Samples with courses that matched since the newest refusal; each course counts for one second at most.
     calm: u32,
-    /// Courses have matched for most of [`TRUST`]: those that drift away later are false, not the bias.
+    /// Courses have matched for most of [`TRUST`]: courses that drift away later are false, and the bias is right.
     is_confirmed: bool,
-    /// Samples with matching courses that a bias which is not known yet still waits for.
+    /// Samples with matching courses for which the learning of a bias that is not known yet is still suspended.
     owed: u32,
     /// Bias and gain with their variances, before the courses that may be false: the newest, and those of [`CALM`] before
     /// it or more, because false ones may match at first. Then the tick of the newest.
@@ -421,7 +421,7 @@ impl Estimator {
             self.failing = Failing { times: 0, drift: None, ..self.failing };
         }
         self.failing.since = None;
-        // False ones that drift match for a while after the heading has started again.
+        // After the heading has started again, false courses that drift match for a while.
         if self.failing.times == 0 || ratio < WELL {
             self.failing.calm = self.failing.calm.saturating_add(paused.min(RATE_HZ));
         }
@@ -448,7 +448,7 @@ impl Estimator {
         self.used.is_some()
     }
 
-    /// Begins with a bias of zero, from which the one so far has been taken off: what was learnt before is another's.
+    /// Drops the bias that is kept for a return: the start in motion has subtracted it from the readings.
     pub(crate) fn refer(&mut self) {
         self.failing.before = [None; 2];
     }
