@@ -90,7 +90,6 @@ fn gyronet(meter: &mut Meter) {
     }
 }
 
-/// Measures whole windows of FoGNet, and its longest piece.
 fn fognet(meter: &mut Meter, (state, minute): &mut (FogNetState, Minute)) {
     let Ok(blob) = FogBlob::new_checked(&weights::FOGNET.0) else {
         hprintln!("FAILED: FoGNet's weight file is refused");
@@ -112,15 +111,6 @@ fn fognet(meter: &mut Meter, (state, minute): &mut (FogNetState, Minute)) {
             black_box(network.estimate(black_box(&window)));
         });
     }
-    let Some(window) = minute.window() else { return };
-    network.start(&window);
-    // Skip both directions of layer 1, and the first piece of layer 2: the pieces that follow are the longest.
-    for _ in 0..=STEPS {
-        network.advance();
-    }
-    meter.run("fognet/piece", || {
-        black_box(network.advance());
-    });
 }
 
 /// Measures a window of models with a linear part and 0 to 32 units, of the paper's model, and of the default

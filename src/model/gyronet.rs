@@ -156,10 +156,6 @@ impl<'w, S: Memory> GyroNet<'w, S> {
         Ok(Self { blob, state })
     }
 
-    pub fn blob(&self) -> &Blob<'w> {
-        &self.blob
-    }
-
     /// Loads a window and runs the linear part; [`GyroNet::advance`] runs the rest. One in progress is dropped.
     pub fn start(&mut self, window: &[Features; WINDOW]) {
         self.state.start(&self.blob, window);
