@@ -1,8 +1,7 @@
 //! Builds FoGNet's input: the last minute in steps of a second.
 //!
 //! Over a second, increments (gyro, wheels) are summed and the inertial sensor is averaged, in integers, so that no bit
-//! of the gyro's angle is lost. A gap in the gyro ends the window, because the angle turned in it would be missing from
-//! the sum; so does a second that has inertial samples or wheel speeds in less than half of its frames.
+//! of the gyro's angle is lost. A second that has inertial samples in less than half of its frames ends the window.
 
 use super::window::Ring;
 use crate::model::window;
@@ -18,11 +17,11 @@ pub const FRAMES: u32 = RATE_HZ;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FogFrame {
-    /// Angle turned about z (up) since the frame before; `None` if part of it is unknown.
-    pub turn: Option<Angle>,
+    /// Angle turned about z (up) since the frame before.
+    pub turn: Angle,
     /// Reading of the inertial sensor, its gyro less the static bias ([`window::Features`]).
     pub inertial: Option<window::Features>,
-    pub wheels: Option<[WheelSpeed; 2]>,
+    pub wheels: [WheelSpeed; 2],
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -32,98 +31,53 @@ pub struct Second {
     pub turn: Angle,
 }
 
+/// A second that lacks inertial samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Incomplete {
-    Gyro,
-    Inertial,
-    Wheels,
-}
+pub struct Incomplete;
 
 #[derive(Debug, Clone, Copy)]
 pub struct SecondSums {
     frames: u32,
     turn: i64,
-    inertial: Mean<{ window::FEATURES }>,
-    wheels: Mean<2>,
-}
-
-#[derive(Debug, Clone, Copy)]
-struct Mean<const N: usize> {
-    sums: [i64; N],
-    count: u32,
-}
-
-impl<const N: usize> Mean<N> {
-    const ZERO: Self = Self { sums: [0; N], count: 0 };
-
-    fn add(&mut self, codes: Option<[i32; N]>) {
-        for (sum, code) in self.sums.iter_mut().zip(codes.unwrap_or([0; N])) {
-            *sum += i64::from(code);
-        }
-        self.count += u32::from(codes.is_some());
-    }
-
-    /// Returns the means to the nearest code; `None` when less than half of the second's frames had a value.
-    fn take(&self) -> Option<[i32; N]> {
-        let count = i64::from(self.count.max(1));
-        // A mean of int32s fits an int32.
-        (2 * self.count >= FRAMES).then(|| self.sums.map(|sum| (sum + count / 2).div_euclid(count) as i32))
-    }
+    /// Sums of the inertial features and of the wheels' speeds.
+    sums: [i64; FEATURES],
+    inertial: u32,
 }
 
 impl SecondSums {
-    pub const ZERO: Self = Self { frames: 0, turn: 0, inertial: Mean::ZERO, wheels: Mean::ZERO };
+    pub const ZERO: Self = Self { frames: 0, turn: 0, sums: [0; _], inertial: 0 };
 
     /// Adds a frame; returns the second that it completes. After an error the next frame begins a new second.
     pub fn add(&mut self, frame: &FogFrame) -> Result<Option<Second>, Incomplete> {
-        let Some(turn) = frame.turn else {
-            *self = Self::ZERO;
-            return Err(Incomplete::Gyro);
-        };
         self.frames += 1;
-        self.turn = self.turn.saturating_add(turn.0);
-        self.inertial.add(frame.inertial);
-        self.wheels.add(frame.wheels.map(|wheels| wheels.map(|speed| speed.0)));
+        self.turn = self.turn.saturating_add(frame.turn.0);
+        let codes = frame.inertial.unwrap_or_default().into_iter().chain(frame.wheels.map(|speed| speed.0));
+        self.sums.iter_mut().zip(codes).for_each(|(sum, code)| *sum += i64::from(code));
+        self.inertial += u32::from(frame.inertial.is_some());
         if self.frames < FRAMES {
             return Ok(None);
         }
-        let Self { turn, inertial, wheels, .. } = core::mem::replace(self, Self::ZERO);
-        let [fx, fy, fz, rx, ry, rz] = inertial.take().ok_or(Incomplete::Inertial)?;
-        let [left, right] = wheels.take().ok_or(Incomplete::Wheels)?;
-        Ok(Some(Second { features: [fx, fy, fz, rx, ry, rz, left, right], turn: Angle(turn) }))
+        let Self { turn, sums, inertial, .. } = core::mem::replace(self, Self::ZERO);
+        if 2 * inertial < FRAMES {
+            return Err(Incomplete);
+        }
+        let features = core::array::from_fn(|k| {
+            let count = i64::from(if k < window::FEATURES { inertial } else { FRAMES });
+            // To the nearest code. A mean of int32s fits an int32.
+            (sums[k] + count / 2).div_euclid(count) as i32
+        });
+        Ok(Some(Second { features, turn: Angle(turn) }))
     }
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct NewSecond {
-    /// Number of the second, and of the window that it ends.
-    pub number: u32,
-    /// Says whether it begins a new window: the first one, or the first one after a gap.
-    pub is_first: bool,
-    pub second: Second,
 }
 
 #[derive(Debug, Clone)]
 pub struct Minute {
     seconds: Ring<Second, STEPS>,
-    newest: u32,
 }
 
 impl Minute {
-    pub const EMPTY: Self = Self {
-        seconds: Ring::without_elements(Second { features: [0; FEATURES], turn: Angle::ZERO }),
-        newest: 0,
-    };
-
-    /// Adds the next second; returns the window that it ends. A second that was missed begins a new window.
-    pub fn follow(&mut self, new: NewSecond) -> SecondsWindow<'_> {
-        if new.is_first || new.number != self.newest.wrapping_add(1) {
-            self.seconds.clear();
-        }
-        self.newest = new.number;
-        self.add(new.second);
-        SecondsWindow { seconds: &self.seconds }
-    }
+    pub const EMPTY: Self =
+        Self { seconds: Ring::without_elements(Second { features: [0; FEATURES], turn: Angle::ZERO }) };
 
     pub fn add(&mut self, second: Second) {
         self.seconds.add(second);

@@ -1,7 +1,6 @@
 //! FoGNet behind the board, on simulated sequences that training has not seen: on its own gyro it must make the turns of
 //! minutes better, on another one it must not run. The figures of whole sequences are a report: `cargo paper tables`.
 
-use gyronet::fog::FogConfig;
 use gyronet::model::fognet::FogNetState;
 use gyronet::model::{FogBlob, FogNet, weights};
 use gyronet_host_tests::sequence::simulate;
@@ -33,7 +32,7 @@ fn fognet_makes_the_turns_of_minutes_better() {
     for number in RUNS {
         let sequence = simulated(1, number);
         let base = after_base(&sequence);
-        let fognet = run(&base, &mut network, FogConfig::DEFAULT);
+        let fognet = run(&base, &mut network);
         let seconds = u64::from(SECONDS);
         assert!((seconds - 5..=seconds).contains(&fognet.windows) && fognet.implausible == 0, "{fognet:?}");
         errors[0] += error_of_minutes(&sequence, base.steps.iter().map(|step| step.fog));

@@ -2,7 +2,6 @@
 //! its losses (Eq. 14 to 16), and the windows of GyroNet. Python needs numpy alone.
 
 use crate::fognet_integer::rms;
-use gyronet::fog::FogConfig;
 use gyronet::model::fognet::{FogEstimate, MinuteNetwork};
 use gyronet::model::seconds::{FRAMES, STEPS, Second, SecondsWindow};
 use gyronet::units::{Angle, AngularRate, SpecificForce, WheelSpeed};
@@ -63,7 +62,7 @@ fn python_and_the_library_make_the_same_windows_and_losses() {
     let csv = folder.join("made.csv");
     sequence::write_csv(&sequence, BufWriter::new(File::create(&csv).unwrap())).unwrap();
     let mut windows = Windows::default();
-    fog_replay::run(&sequence, &mut windows, FogConfig::DEFAULT);
+    fog_replay::run(&sequence, &mut windows);
 
     let script = workspace().join("host-tests/tests/clients/training_windows.py");
     let ends = ENDS.map(|end| end.to_string()).join(",");

@@ -8,7 +8,7 @@ use gyronet::estimate::YawEstimate;
 use gyronet::fog::{FogConfig, FogCorrector, FogErrors};
 use gyronet::model::fognet::MinuteNetwork;
 use gyronet::model::fognet_blob::{Gyro, Training};
-use gyronet::model::seconds::{FogFrame, Minute};
+use gyronet::model::seconds::FogFrame;
 use gyronet::model::window::Features;
 use gyronet::sample::{FogSample, ImuSample, PERIOD_US, RATE_HZ, Validity};
 use gyronet::units::{Angle, AngularRate, Micros, SpecificForce, WheelSpeed};
@@ -30,10 +30,9 @@ pub struct FogReplay {
     pub broken: u64,
 }
 
-pub fn run(sequence: &Sequence, network: &mut dyn MinuteNetwork, config: FogConfig) -> FogReplay {
+pub fn run(sequence: &Sequence, network: &mut dyn MinuteNetwork) -> FogReplay {
     let inertial = features(sequence);
-    let mut corrector = FogCorrector::new(config);
-    let mut minute = Minute::EMPTY;
+    let mut corrector = FogCorrector::START;
     let mut drive = FogReplay::default();
     for (step, inertial) in sequence.steps.iter().zip(inertial) {
         let wheels = step.wheels.map(|way| {
@@ -41,21 +40,13 @@ pub fn run(sequence: &Sequence, network: &mut dyn MinuteNetwork, config: FogConf
             // The cast saturates only beyond the speed of sound.
             WheelSpeed(speed.round() as i32)
         });
-        let frame = FogFrame {
-            turn: Some(angle(step.fog)),
-            inertial: inertial.filter(|_| !step.imu_gap),
-            wheels: Some(wheels),
-        };
-        let output = corrector.correct(&frame);
-        if let Some(second) = output.due {
-            let estimate = network.estimate(&minute.follow(second));
-            drive.windows += 1;
-            corrector.deliver(second.number, estimate);
-        }
-        drive.turns.push(output.turn.map_or(0.0, Angle::rad));
+        let frame = FogFrame { turn: angle(step.fog), inertial: inertial.filter(|_| !step.imu_gap), wheels };
+        let output = corrector.correct(&frame, network);
+        drive.turns.push(output.turn.rad());
+        drive.windows += u64::from(output.is_window);
         drive.corrected += u64::from(output.corrected);
-        drive.implausible += u64::from(output.implausible.is_some());
-        drive.broken += u64::from(output.broken.is_some());
+        drive.implausible += u64::from(output.implausible);
+        drive.broken += u64::from(output.broken);
     }
     drive
 }
@@ -196,7 +187,7 @@ mod tests {
         let spec = Spec { name: String::from("short"), seconds: 40, device: 1, run: 1 };
         simulate::write(&spec, folder.path()).unwrap();
         let sequence = Sequence::read(folder.path()).unwrap();
-        let fog = run(&sequence, &mut Bias, FogConfig::DEFAULT);
+        let fog = run(&sequence, &mut Bias);
         assert_eq!((fog.windows, fog.broken), (39, 0));
         let raw: f64 = sequence.steps.iter().map(|step| step.fog).sum();
         // 1e-7 rad in each corrected step, whatever the gyro reads.

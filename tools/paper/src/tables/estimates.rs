@@ -13,7 +13,6 @@ use crate::fog_replay;
 use crate::sequence::{self, Sequence};
 use crate::simulate::world::EARTH_RATE;
 use gyronet::bias::{STATIC_SAMPLES, StaticConfig};
-use gyronet::fog::FogConfig;
 use gyronet::model::WindowNetwork;
 use gyronet::model::fognet::{FogEstimate, MinuteNetwork};
 use gyronet::model::fognet_blob::Training;
@@ -96,7 +95,7 @@ impl Estimates {
             let network: &mut dyn MinuteNetwork =
                 if method == Method::FOGNET { &mut *whole.0 } else { &mut whole };
             let turns = match &fits {
-                Ok(()) => fog_replay::run(&base, network, FogConfig::DEFAULT).turns,
+                Ok(()) => fog_replay::run(&base, network).turns,
                 Err(_) => base.steps.iter().map(|step| step.fog).collect(),
             };
             self.add(method, turns.iter().map(|turn| turn / DT).collect());
@@ -111,7 +110,7 @@ impl Estimates {
         for (step, turn) in sequence.steps.iter_mut().skip(self.start).zip(&looped.turns) {
             step.fog = *turn;
         }
-        let drive = fog_replay::run(&sequence, network, FogConfig::DEFAULT);
+        let drive = fog_replay::run(&sequence, network);
         self.push(Method::PSEUDO_FOG, drive.turns[self.start..].to_vec());
     }
 
