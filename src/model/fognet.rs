@@ -17,7 +17,7 @@
 use super::fognet_blob::{COLUMNS, FogBlob, HIDDEN1, HIDDEN2, INPUTS};
 use super::input::load_step;
 use crate::model::seconds::{STEPS, SecondsWindow};
-use crate::nn::bilstm::{self, Direction, Layer, Pass, Run};
+use crate::nn::bilstm::{self, Direction, Run};
 use crate::nn::lstm::Scratch;
 use crate::nn::{dense::Dense, pack, unpack};
 use crate::units::{Angle, AngularRate};
@@ -107,20 +107,16 @@ impl MinuteNetwork for FogNet<'_, '_> {
             let f1 = blob.fc1.scale(f1).min(clamp).max(-clamp);
             input[bilstm::word_index(step, 0, 2)] = pack(f1 as i16, gyro as i16);
         }
-        // FC2 needs only the last step, where the backward pass of LSTM2's second layer begins.
+        // FC2 needs only the last step, with which the backward pass of LSTM2's second layer begins.
         let (input, between) = (&input[..STEPS], &mut between[..STEPS * HIDDEN2]);
-        let (mut f2, mut run, mut last) = (blob.fc2.bias, Run::START, false);
+        let (mut f2, mut run, mut seen) = (blob.fc2.bias, Run::START, 0);
         while run.advance(&blob.lstm2, input, between, scratch, &mut [], |direction, step, hidden| {
             if step == STEPS - 1 {
                 f2 = f2.wrapping_add(half(blob.fc2.weights, direction, hidden));
-                last = true;
+                seen += 1;
             }
-        }) && !last
+        }) && seen < 2
         {}
-        let [_, Layer { backward, .. }] = &blob.lstm2;
-        Pass::first(Direction::Backward, backward, between, scratch, |_, hidden| {
-            f2 = f2.wrapping_add(half(blob.fc2.weights, Direction::Backward, hidden));
-        });
         let correction = Angle(linear.0.saturating_add(blob.spread(f2).0));
         FogEstimate { correction, linear, gain: blob.mean_gain(), clamped_inputs }
     }

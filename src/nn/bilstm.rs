@@ -80,28 +80,6 @@ impl Pass {
         }
         self.done < pairs
     }
-
-    /// Runs only the first step of a pass, half a pair; passes its number and hidden state to `emit`.
-    pub fn first<const U: usize, const W: usize, const P: usize>(
-        direction: Direction,
-        weights: &DirectionWeights<'_>,
-        input: &[u32],
-        scratch: &mut Scratch<U, W, P>,
-        emit: impl FnOnce(usize, &[u32; W]),
-    ) {
-        let words = weights.inputs();
-        let (pair, first) = match direction {
-            Direction::Forward => (0, 0),
-            Direction::Backward => (input.len().checked_div(words).unwrap_or(0).saturating_sub(1), 1),
-        };
-        let Scratch { cell_state, hidden: [hidden, _], projection } = scratch;
-        let columns = input.get(pair * words..(pair + 1) * words);
-        let Some((columns, projection)) = columns.zip(projection.first_mut()) else { return };
-        lstm::project(weights, columns, core::slice::from_mut(projection));
-        *cell_state = [0; U];
-        lstm::step(weights, &projection[first], None, cell_state, hidden);
-        emit(2 * pair + first, hidden);
-    }
 }
 
 /// Returns the index of word `column / 2` of `step` in a sequence of `columns` values a step.
