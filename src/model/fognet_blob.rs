@@ -93,9 +93,6 @@ pub struct FogBlob<'w> {
     pub lstm2: [Layer<'w>; 2],
     /// The weights of FC2 times FC4's factor for FC2.
     pub fc2: Dense<'w>,
-    /// The file's own checksum, which identifies this set of weights, and the bytes that it covers.
-    pub crc: u32,
-    pub content: &'w [u8],
 }
 
 pub const fn file_len(provenance: usize) -> usize {
@@ -113,7 +110,7 @@ impl<'w> FogBlob<'w> {
     pub fn new_checked(bytes: &'w [u8]) -> Result<Self, BlobError> {
         let mut reader = Reader::new(bytes, file_len(0));
         let shape = |found| (found == TOPOLOGY).then_some(());
-        let Header { shape: (), input_clamp, normalisation, provenance_len, crc } =
+        let Header { shape: (), input_clamp, normalisation, provenance_len, .. } =
             Header::read(&mut reader, TOPOLOGY, shape, |(), provenance| file_len(provenance))?;
         let gains = reader.slice(STEPS)?;
         let (low, high) = (reader.i32()? as u32, reader.i32()?);
@@ -132,22 +129,7 @@ impl<'w> FogBlob<'w> {
         check_rows(&lstm2, input_clamp.into(), 2)?;
         check_dense(&fc1)?;
         check_dense(&fc2)?;
-        // The header has been checked, so the checksum is present.
-        let content = bytes.get(..bytes.len().saturating_sub(4)).unwrap_or_default();
-        Ok(Self {
-            provenance,
-            training,
-            normalisation,
-            input_clamp,
-            gains,
-            offset,
-            lstm1,
-            fc1,
-            lstm2,
-            fc2,
-            crc,
-            content,
-        })
+        Ok(Self { provenance, training, normalisation, input_clamp, gains, offset, lstm1, fc1, lstm2, fc2 })
     }
 
     /// Returns the correction for a complete sum of [`FogBlob::fc2`], without the linear part.
