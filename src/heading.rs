@@ -4,8 +4,10 @@
 //! read by its description. [`GnssLine`] reads UBX and NMEA 0183. [`HeadingReceiver`] takes what the configuration names,
 //! and [`Estimator`] learns.
 
+mod course_config;
 mod described;
 mod estimator;
+mod failing;
 pub(crate) mod filter;
 mod gain;
 mod gnss;
@@ -17,9 +19,10 @@ mod receiver;
 mod turns;
 mod ubx;
 
+pub use course_config::CourseConfig;
 pub use described::HeadingSignal;
-pub(crate) use estimator::{BRIDGED, FINE_BIAS, gain_knowledge};
-pub use estimator::{CourseConfig, CourseCounters, CourseState, Estimator, Refusal};
+pub(crate) use estimator::{BRIDGED, COARSE_BIAS, FINE_BIAS, gain_knowledge};
+pub use estimator::{CourseCounters, CourseState, Estimator, Refusal};
 pub use gain::Gain;
 pub use gnss::{GnssLine, GnssProtocol, GnssSettings};
 pub use receiver::{HeadingConfigError, HeadingReceiver, HeadingSettings, Received};

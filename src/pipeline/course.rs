@@ -9,7 +9,9 @@ use super::{Pipeline, State};
 use crate::bias::ZeroRate;
 use crate::compensate::Remaining;
 use crate::heading::filter::{BIAS, Filter, GAIN};
-use crate::heading::{CourseCounters, CourseState, FINE_BIAS, Gain, Heading, Refusal, gain_knowledge};
+use crate::heading::{
+    COARSE_BIAS, CourseCounters, CourseState, FINE_BIAS, Gain, Heading, Refusal, gain_knowledge,
+};
 use crate::health::slow::Knowledge;
 use crate::mounting::{Rotation, Vertical};
 use crate::sample::Frame;
@@ -114,10 +116,12 @@ impl Pipeline {
         }
     }
 
-    /// Notes once a bias that was found in motion is as good as one after a standstill.
+    /// Notes whether a bias is coarse: one that was found in motion, or that courses made so, until it is as good as one after a
+    /// standstill.
     pub(super) fn judge_start(&mut self) {
         if let Some(Initialised { zero_rate: Some(zero_rate), is_coarse, .. }) = &mut self.state.initialised {
-            *is_coarse &= zero_rate.sigma() > FINE_BIAS;
+            let is_coarser = zero_rate.filter().variance::<BIAS>() > COARSE_BIAS * COARSE_BIAS;
+            *is_coarse = is_coarser || *is_coarse && zero_rate.sigma() > FINE_BIAS;
         }
     }
 

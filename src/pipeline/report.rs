@@ -4,6 +4,7 @@ use super::{BoardState, Origin, Pipeline, Rates, Turning};
 use crate::bias::ZeroRate;
 use crate::compensate::Compensated;
 use crate::estimate::{VehicleSample, YawEstimate};
+use crate::heading::COARSE_BIAS;
 use crate::health::{Faults, Quality, Source, Status, judge};
 use crate::sample::{Frame, PERIOD_US, Validity, WheelSample};
 use crate::sqrt::sqrt;
@@ -123,7 +124,9 @@ impl Pipeline {
     fn bias_sigma(&self, early: Option<f32>, shift: f32) -> f32 {
         let sigma = early.unwrap_or_else(|| self.zero_rate().map_or(0.0, ZeroRate::sigma));
         let carried = self.state.compensator.carried_in_a_second();
-        sqrt(sigma * sigma + shift * shift + carried * carried)
+        // Courses that drift away from a bias: it may have changed.
+        let drifts = if self.state.course.is_suspended() { COARSE_BIAS } else { 0.0 };
+        sqrt(sigma * sigma + shift * shift + carried * carried + drifts * drifts)
     }
 
     /// Returns what a delayed rate contributes to the expected error; before there is one, the reading itself.

@@ -128,9 +128,9 @@ fn true_course(second: usize, headings: &[f64]) -> Option<f64> {
 
 #[test]
 fn a_vehicle_that_never_stands_is_usable_in_20_s_and_good_in_60() {
-    // One course in so many is off by 30 deg, which delays the start.
-    for (is_lossy, outliers, [soon, later]) in
-        [(false, 1000, [20.0, 60.0]), (true, 1000, [20.0, 60.0]), (false, 7, [40.0, 120.0])]
+    // One course in so many is off by 30 deg: it delays the start, and the bias stays as coarse as a good one may be.
+    for (is_lossy, outliers, [soon, later], off) in
+        [(false, 1000, [20.0, 60.0], 0.6), (true, 1000, [20.0, 60.0], 0.6), (false, 7, [50.0, 130.0], 3.4)]
     {
         let course = |second: usize, headings: &[f64]| {
             let off = if second % outliers == outliers - 1 { 0.5 } else { 0.0 };
@@ -154,7 +154,7 @@ fn a_vehicle_that_never_stands_is_usable_in_20_s_and_good_in_60() {
         assert_eq!(known, [Knowledge::Coarse, Knowledge::Fine]);
         let held = error(&outputs, &headings, 58).to_degrees();
         println!("heading held for a minute: {held:.3} deg");
-        assert!(held.abs() < 0.6, "{held} deg");
+        assert!(held.abs() < off, "{held} deg");
         assert_eq!(pipeline.status(None).bias, Knowledge::Fine);
     }
     // Without courses it never starts.
@@ -163,8 +163,9 @@ fn a_vehicle_that_never_stands_is_usable_in_20_s_and_good_in_60() {
 }
 
 #[test]
-fn the_gain_is_learnt_where_the_vehicle_turns_both_ways() {
-    let (pipeline, ..) = drive(1_200, &Drive { stands: 5, creeps: 0.0, turn: &road, course: &true_course });
+fn the_gain_is_learnt_between_straights_where_the_vehicle_turns_both_ways() {
+    let turns = Drive { stands: 5, creeps: 0.0, turn: &streets, course: &true_course };
+    let (pipeline, ..) = drive(1_800, &turns);
     let (gain, sigma) = pipeline.gain();
     println!("gain {gain:.5}, sigma {sigma:?}");
     assert!((f64::from(gain) - GAIN).abs() < 0.002, "{gain}");
@@ -286,6 +287,91 @@ fn a_slow_vehicle_that_reverses_learns_where_the_accuracy_is_stated() {
     assert_eq!(own, due);
 }
 
+/// A right angle each 20 s, to the left and to the right, at most by so much, rad/s.
+fn streets(second: f64) -> f64 {
+    let turns = if (second / 40.0).fract() < 0.5 { 0.1 * PI } else { -0.1 * PI };
+    if (second / 20.0).fract() < 0.75 { 0.0 } else { turns }
+}
+
+/// Receivers that smooth, run ahead, scale or are on a trailer show a part of each turn too much or too little for a while.
+#[test]
+fn courses_that_show_turns_wrongly_teach_no_wrong_gain() {
+    let smoothed = |_: usize, headings: &[f64]| {
+        let last = headings.len().checked_sub(1)?;
+        let weights = (0..500).map(|ago| (-0.01 * f64::from(ago)).exp());
+        let sum: f64 = weights.clone().sum();
+        Some(
+            weights.zip(0..).map(|(weight, ago)| weight * headings[last.saturating_sub(ago)]).sum::<f64>()
+                / sum,
+        )
+    };
+    let ahead = |second: usize, headings: &[f64]| {
+        let turn: f64 = (0..100).map(|tick| 0.01 * road(second as f64 + 0.01 * f64::from(tick))).sum();
+        Some(headings.last()? + turn)
+    };
+    let scaled = |_: usize, headings: &[f64]| Some(1.02 * ago(headings, 0.3)?);
+    let trailer = |_: usize, headings: &[f64]| {
+        let mut trailer = *headings.first()?;
+        headings.iter().for_each(|heading| trailer += 0.01 * (fast(0.0) / 8.0) * (heading - trailer).sin());
+        Some(trailer)
+    };
+    type Case<'a> = (&'a str, &'a dyn Fn(f64) -> f64, &'a Course<'a>);
+    let cases: [Case<'_>; 6] = [
+        ("winding, smoothed", &road, &smoothed),
+        ("winding, ahead", &road, &ahead),
+        ("winding, scaled", &road, &scaled),
+        ("winding, trailer", &road, &trailer),
+        ("streets, smoothed", &streets, &smoothed),
+        ("streets, trailer", &streets, &trailer),
+    ];
+    for (name, turn, course) in cases {
+        for seed in 0..4 {
+            let part =
+                Part { noise: Noise::new(40 + seed), gain: 0.0, walk: 2e-6, speed: fast, is_lossy: false };
+            let drive = Drive { stands: 10, creeps: 0.0, turn, course };
+            let (pipeline, ..) = drive_with(PipelineConfig::DEFAULT, part, 900, &drive);
+            let (gain, sigma) = pipeline.gain();
+            println!("{name}: gain {gain:+.5}, sigma {sigma:?}");
+            assert!(sigma.is_some_and(|sigma| gain.abs() < 4.0 * sigma), "{name}: {gain}, {sigma:?}");
+        }
+    }
+}
+
+/// The receiver is deceived, or the bias of the gyro has jumped: at first nobody can know.
+#[test]
+fn a_confirmed_bias_is_held_for_two_minutes_against_courses_that_drift_away() {
+    let straight = |second: f64| 0.01 * (second / 40.0).sin();
+    let drift = 0.2_f64.to_radians();
+    // From 100 s on, for so long.
+    let learnt = |lasts: f64, seconds| {
+        let course = |second: usize, headings: &[f64]| {
+            Some(ago(headings, 0.3)? + drift * (second as f64 - 100.0).clamp(0.0, lasts))
+        };
+        let part = Part { noise: Noise::new(7), gain: 0.0, walk: 0.0, speed: fast, is_lossy: false };
+        let drive = Drive { stands: 10, creeps: 0.0, turn: &straight, course: &course };
+        let (pipeline, outputs, _) = drive_with(PipelineConfig::DEFAULT, part, seconds, &drive);
+        let (status, live) = (pipeline.status(None), outputs.last().expect("outputs").vehicle.live);
+        let sigma = live.sigma.expect("a sigma").rad_per_sec();
+        (pipeline.bias().rad_per_sec(), (status.bias, status.gain, live.quality), sigma)
+    };
+    let (before, ..) = learnt(0.0, 100);
+    let (fine, refused, unknown) = (Knowledge::Fine, Knowledge::Refused, Knowledge::Unknown);
+    for (lasts, seconds, moved, state, least) in [
+        (500.0, 140, 0.0..0.15, (fine, refused, Quality::Good), 2e-3),
+        (500.0, 230, 0.0..0.15, (fine, refused, Quality::Good), 2e-3),
+        (500.0, 250, 0.5..1.5, (Knowledge::Coarse, unknown, Quality::Degraded), 5e-4),
+        (500.0, 320, 0.9..1.1, (fine, unknown, Quality::Good), 0.0),
+        (50.0, 240, 0.0..0.15, (fine, unknown, Quality::Good), 0.0),
+    ] {
+        let (bias, known, sigma) = learnt(lasts, seconds);
+        let share = (before - bias) / drift;
+        println!(
+            "{seconds} s, drift for {lasts} s: the bias has taken {share:.2} of it, {known:?}, {sigma:.5}"
+        );
+        assert!(moved.contains(&share) && known == state && sigma > least, "{lasts}, {seconds}");
+    }
+}
+
 /// Courses against zero-rate updates alone.
 #[test]
 fn courses_never_make_the_heading_worse_than_zero_rate_updates() {
@@ -297,11 +383,14 @@ fn courses_never_make_the_heading_worse_than_zero_rate_updates() {
     let reflected = |second: usize, headings: &[f64]| {
         Some(ago(headings, 0.3)? + after(second, 0.3 * (1.0 - (2.1 * second as f64).cos())))
     };
-    let winding: [(&str, &Course<'_>); 12] = [
+    let winding: [(&str, &Course<'_>); 13] = [
         ("latency 0 s", &|_, headings| ago(headings, 0.0)),
         ("latency 1 s", &|_, headings| ago(headings, 1.0)),
         ("latency 2 s", &|_, headings| ago(headings, 2.0)),
         ("latency 0 to 2 s", &|second, headings| ago(headings, 1.0 + (second as f64 / 9.0).sin())),
+        ("latency 0 to 2 s, another phase", &|second, headings| {
+            ago(headings, 1.0 + (second as f64 / 9.0 + 1.2).sin())
+        }),
         ("backwards", &|second, headings| Some(ago(headings, 0.3)? + after(second, PI))),
         ("jumps by 90 deg", &|second, headings| Some(ago(headings, 0.3)? + after(second, 0.5 * PI))),
         ("spoofed, 3 deg/s", &|second, headings| {
