@@ -48,6 +48,8 @@ const REMEMBERED: f32 = 12.0;
 const BOTH_WAYS: [f32; 2] = [1.0, 0.2];
 /// Turn during which a course that does not change has failed, rad.
 const STANDS: f32 = 0.05;
+/// Speed below which a course of unknown accuracy teaches a bias no more that is known, m/s: reflections of 0.3 m/s last.
+const SLOW: f32 = 4.0;
 /// Longest gap that is bridged by the mean of the rates around it, samples.
 pub(crate) const BRIDGED: u32 = RATE_HZ / 5;
 /// Fewest courses with which a vehicle starts in motion.
@@ -80,6 +82,7 @@ struct Arrived {
     course: f32,
     speed: f32,
     sigma: f32,
+    is_stated: bool,
 }
 
 /// Counters of courses since the start.
@@ -175,7 +178,8 @@ impl Estimator {
             && let Some(sigma) = self.config.sigma(heading)
         {
             // Counted clockwise by receivers.
-            self.waiting = Some(Arrived { tick, course: wrap(-course), speed, sigma });
+            let is_stated = heading.course_sigma.or(heading.speed_sigma).is_some();
+            self.waiting = Some(Arrived { tick, course: wrap(-course), speed, sigma, is_stated });
         }
     }
 
@@ -316,12 +320,14 @@ impl Estimator {
         let new = Match { tick: arrived.tick, paused: paused.min(RATE_HZ), ratio, side };
         let is_known = filter.variance::<BIAS>() <= FINE_BIAS * FINE_BIAS;
         let [teaches_bias, teaches_gain] = self.failing.matched(filter, &new, is_known);
+        let is_clear = arrived.is_stated || arrived.speed >= SLOW;
         let is_straight = self.straight as f32 >= STRAIGHT_BLOCKS + back;
         let [least, most] = LAGS;
         let lag = filter.get::<LAG>();
         let is_in_time = lag > least && lag < most || filter.variance::<LAG>() > KNOWN_LAG * KNOWN_LAG;
-        let teaches_gain = teaches_gain && self.learns_gain && is_straight;
-        filter.course(&measured, [!(teaches_bias && is_in_time), !(teaches_gain && is_in_time)]);
+        let teaches_bias = teaches_bias && is_in_time && (is_clear || !is_known);
+        let teaches_gain = teaches_gain && is_in_time && is_clear && self.learns_gain && is_straight;
+        filter.course(&measured, [!teaches_bias, !teaches_gain]);
         filter.put::<LAG>(filter.get::<LAG>().max(least).min(most));
         filter.put::<GAIN>(filter.get::<GAIN>().clamp(-MAX_GAIN, MAX_GAIN));
         self.used = Some(arrived.tick);

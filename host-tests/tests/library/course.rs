@@ -287,6 +287,19 @@ fn a_slow_vehicle_that_reverses_learns_where_the_accuracy_is_stated() {
     assert_eq!(own, due);
 }
 
+#[test]
+fn a_slow_vehicle_whose_receiver_states_no_accuracy_keeps_the_bias_of_its_rest() {
+    let due = after_courses(&road, &|_, _| None, fast, |_| {});
+    // A speed across of 0.3 m/s by reflections, which comes and goes.
+    let reflected = |second: usize, headings: &[f64]| {
+        Some(ago(headings, 0.3)? + 0.085 * (second as f64 / 13.0).sin()).filter(|_| second < 180)
+    };
+    let own =
+        after_courses(&road, &reflected, |_| 3.5, |pipeline| assert!(pipeline.course_counters().used > 100));
+    println!("{own:.2?} deg, {due:.2?} without courses");
+    assert!(own[0] < due[0] + 0.1 && own[1] < due[1] + 0.1, "{own:?}, {due:?} without courses");
+}
+
 /// A right angle each 20 s, to the left and to the right, at most by so much, rad/s.
 fn streets(second: f64) -> f64 {
     let turns = if (second / 40.0).fract() < 0.5 { 0.1 * PI } else { -0.1 * PI };
