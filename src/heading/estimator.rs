@@ -48,7 +48,7 @@ const REMEMBERED: f32 = 12.0;
 const BOTH_WAYS: [f32; 2] = [1.0, 0.2];
 /// Turn during which a course that does not change has failed, rad.
 const STANDS: f32 = 0.05;
-/// Speed below which a course of unknown accuracy teaches a bias no more that is known, m/s: reflections of 0.3 m/s last.
+/// Speed below which a course of unknown accuracy no longer teaches a known bias, nor the gain, m/s: reflections of 0.3 m/s last.
 const SLOW: f32 = 4.0;
 /// Longest gap that is bridged by the mean of the rates around it, samples.
 pub(crate) const BRIDGED: u32 = RATE_HZ / 5;
@@ -317,16 +317,17 @@ impl Estimator {
         }
         let side = off / sqrt((innovation - variance).max(0.0) + own);
         let side = side.clamp(-BOUNDED, BOUNDED);
-        let new = Match { tick: arrived.tick, paused: paused.min(RATE_HZ), ratio, side };
         let is_known = filter.variance::<BIAS>() <= FINE_BIAS * FINE_BIAS;
-        let [teaches_bias, teaches_gain] = self.failing.matched(filter, &new, is_known);
         let is_clear = arrived.is_stated || arrived.speed >= SLOW;
         let is_straight = self.straight as f32 >= STRAIGHT_BLOCKS + back;
         let [least, most] = LAGS;
         let lag = filter.get::<LAG>();
         let is_in_time = lag > least && lag < most || filter.variance::<LAG>() > KNOWN_LAG * KNOWN_LAG;
+        let can_teach = is_in_time && is_clear;
+        let new = Match { tick: arrived.tick, paused: paused.min(RATE_HZ), ratio, side, can_teach };
+        let [teaches_bias, teaches_gain] = self.failing.matched(filter, &new, is_known);
         let teaches_bias = teaches_bias && is_in_time && (is_clear || !is_known);
-        let teaches_gain = teaches_gain && is_in_time && is_clear && self.learns_gain && is_straight;
+        let teaches_gain = teaches_gain && can_teach && self.learns_gain && is_straight;
         filter.course(&measured, [!teaches_bias, !teaches_gain]);
         filter.put::<LAG>(filter.get::<LAG>().max(least).min(most));
         filter.put::<GAIN>(filter.get::<GAIN>().clamp(-MAX_GAIN, MAX_GAIN));
@@ -335,9 +336,9 @@ impl Estimator {
         Ok(())
     }
 
-    /// Returns whether courses have been off to one side for long, so that they teach nothing for a while.
-    pub(crate) const fn is_suspended(&self) -> bool {
-        self.failing.is_suspended()
+    /// Returns once that the bias has become coarse by courses that contradict it.
+    pub(crate) const fn has_doubted(&mut self) -> bool {
+        core::mem::replace(&mut self.failing.has_doubted, false)
     }
 
     pub(crate) fn has_begun(&self) -> bool {

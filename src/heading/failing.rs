@@ -9,7 +9,7 @@
 //!   changed, and the bias becomes coarse;
 //! - after [`PATIENCE`] without a match the heading starts again from the course; bias and gain are again those of the
 //!   newest course that matched well after [`CALM`], unless the vehicle has stood since. Where two such times show the
-//!   same drift, the bias becomes uncertain by it, unless it was confirmed;
+//!   same drift, the bias becomes uncertain by it; where it was confirmed, only after [`MANY`] such times in a row;
 //! - courses that keep failing teach only the heading until they have matched for [`TRUST`].
 
 use super::estimator::COARSE_BIAS;
@@ -32,6 +32,8 @@ const COST: u32 = 2;
 const SIDE: f32 = 0.8;
 const SIDE_SECONDS: f32 = 15.0;
 const SUSPENDED: u32 = 2 * TRUST;
+/// Times in a row that the heading started again, which take as long: courses match for a while after each.
+const MANY: u8 = (SUSPENDED / PATIENCE / 2) as u8;
 /// Distance over its sigma up to which a course matches well.
 const WELL: f32 = 1.0;
 /// Drift of the heading by a wrong bias, rad/s, where one is noticed, rad, and how alike two are: a share, rad/s.
@@ -48,6 +50,8 @@ pub(super) struct Match {
     /// Its distance over its sigma; and the same with its sign, bounded, as if all courses of a second were one.
     pub ratio: f32,
     pub side: f32,
+    /// It is neither too slow nor too late to teach a known bias.
+    pub can_teach: bool,
 }
 
 /// What the courses since the start have shown of each other.
@@ -62,9 +66,12 @@ pub(super) struct Failing {
     trusted: u32,
     /// Samples with courses that matched since the newest one that was refused or off to one side.
     calm: u32,
-    /// Mean of the sides, and the samples for which it has been large since the newest calm.
+    /// Mean of the sides, which one was large last, and the samples for which it has been since the newest calm.
     side: f32,
+    is_left: bool,
     suspended: u32,
+    /// The bias has become coarse, which the pipeline has not noted yet.
+    pub has_doubted: bool,
     /// Courses have matched for most of [`TRUST`] with a known bias: for a while, those that drift away later are taken for
     /// false.
     is_confirmed: bool,
@@ -84,7 +91,9 @@ impl Failing {
         trusted: 0,
         calm: CALM,
         side: 0.0,
+        is_left: false,
         suspended: 0,
+        has_doubted: false,
         is_confirmed: false,
         owed: 0,
         before: [None; 2],
@@ -99,13 +108,14 @@ impl Failing {
         if tick.wrapping_sub(since) <= PATIENCE {
             return false;
         }
-        if let Some([bias, bias_variance, gain, gain_variance]) = self.before[1].take() {
+        let [_, before] = core::mem::take(&mut self.before);
+        if let Some([bias, bias_variance, gain, gain_variance]) = before {
             filter.restart::<BIAS>(bias, bias_variance);
             filter.restart::<GAIN>(gain, gain_variance);
         }
         self.agree();
         let drift = self.start(tick, off);
-        if let Some(drift) = drift.filter(|_| !self.is_confirmed) {
+        if let Some(drift) = drift.filter(|_| !self.is_confirmed || self.times >= MANY) {
             filter.put_variance::<BIAS>(filter.variance::<BIAS>() + drift * drift);
             (self.times, self.drift) = (0, None);
         }
@@ -134,17 +144,9 @@ impl Failing {
         if self.times == 0 || new.ratio < WELL {
             self.calm = self.calm.saturating_add(new.paused);
         }
-        self.is_confirmed |= is_known && self.calm >= TRUST;
-        let seconds = new.paused as f32 / RATE_HZ as f32;
-        self.side += (new.side - self.side) * seconds / (SIDE_SECONDS + seconds);
-        if self.is_confirmed && libm::fabsf(self.side) > SIDE {
-            self.calm = 0;
-            self.suspended += new.paused;
-            self.is_confirmed = self.suspended <= SUSPENDED;
-            if !self.is_confirmed {
-                filter.put_variance::<BIAS>(filter.variance::<BIAS>() + COARSE_BIAS * COARSE_BIAS);
-                self.begin(filter);
-            }
+        if new.can_teach {
+            self.judge_side(filter, new);
+            self.is_confirmed |= is_known && self.calm >= TRUST && libm::fabsf(self.side) <= SIDE;
         }
         let is_calm = self.calm >= CALM;
         if is_calm || !self.is_confirmed {
@@ -155,6 +157,24 @@ impl Failing {
         let teaches = self.times < FAILURES && if is_held { is_calm } else { self.owed == 0 };
         self.owed = self.owed.saturating_sub(new.paused);
         [teaches, self.times < FAILURES && is_calm]
+    }
+
+    fn judge_side(&mut self, filter: &mut Filter, new: &Match) {
+        let seconds = new.paused as f32 / RATE_HZ as f32;
+        self.side += (new.side - self.side) * seconds / (SIDE_SECONDS + seconds);
+        if !self.is_confirmed || libm::fabsf(self.side) <= SIDE {
+            return;
+        }
+        self.calm = 0;
+        if core::mem::replace(&mut self.is_left, self.side > 0.0) != self.is_left {
+            self.suspended = 0;
+        }
+        self.suspended += new.paused;
+        if self.suspended > SUSPENDED {
+            filter.put_variance::<BIAS>(filter.variance::<BIAS>() + COARSE_BIAS * COARSE_BIAS);
+            self.begin(filter);
+            (self.is_confirmed, self.has_doubted) = (false, true);
+        }
     }
 
     /// Keeps bias and gain after a course that matched.
@@ -182,14 +202,9 @@ impl Failing {
         (self.side, self.suspended) = (0.0, 0);
     }
 
-    /// Returns whether courses have been off to one side for long, while the bias is held.
-    pub const fn is_suspended(&self) -> bool {
-        self.suspended >= CALM
-    }
-
     /// Returns whether courses contradict the gyro.
     pub const fn contradicts(&self) -> bool {
-        self.times > 0 || self.is_suspended()
+        self.times > 0 || self.suspended >= CALM
     }
 }
 

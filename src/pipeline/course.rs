@@ -9,9 +9,7 @@ use super::{Pipeline, State};
 use crate::bias::ZeroRate;
 use crate::compensate::Remaining;
 use crate::heading::filter::{BIAS, Filter, GAIN};
-use crate::heading::{
-    COARSE_BIAS, CourseCounters, CourseState, FINE_BIAS, Gain, Heading, Refusal, gain_knowledge,
-};
+use crate::heading::{CourseCounters, CourseState, FINE_BIAS, Gain, Heading, Refusal, gain_knowledge};
 use crate::health::slow::Knowledge;
 use crate::mounting::{Rotation, Vertical};
 use crate::sample::Frame;
@@ -120,8 +118,8 @@ impl Pipeline {
     /// standstill.
     pub(super) fn judge_start(&mut self) {
         if let Some(Initialised { zero_rate: Some(zero_rate), is_coarse, .. }) = &mut self.state.initialised {
-            let is_coarser = zero_rate.filter().variance::<BIAS>() > COARSE_BIAS * COARSE_BIAS;
-            *is_coarse = is_coarser || *is_coarse && zero_rate.sigma() > FINE_BIAS;
+            let is_worse = self.state.course.has_doubted() || *is_coarse;
+            *is_coarse = is_worse && zero_rate.sigma() > FINE_BIAS;
         }
     }
 

@@ -17,7 +17,7 @@ pub(super) struct Initialised {
     pub(super) level: Level,
     pub(super) zero: ZeroPoint,
     pub(super) zero_rate: Option<ZeroRate>,
-    /// The bias was found in motion, and is not known well yet.
+    /// The bias was found in motion, or courses have contradicted it, and it is not known well yet.
     pub(super) is_coarse: bool,
 }
 

@@ -124,8 +124,8 @@ impl Pipeline {
     fn bias_sigma(&self, early: Option<f32>, shift: f32) -> f32 {
         let sigma = early.unwrap_or_else(|| self.zero_rate().map_or(0.0, ZeroRate::sigma));
         let carried = self.state.compensator.carried_in_a_second();
-        // Courses that drift away from a bias: it may have changed.
-        let drifts = if self.state.course.is_suspended() { COARSE_BIAS } else { 0.0 };
+        // The bias may have changed.
+        let drifts = if self.state.course.state().is_contradicted { COARSE_BIAS } else { 0.0 };
         sqrt(sigma * sigma + shift * shift + carried * carried + drifts * drifts)
     }
 
