@@ -21,7 +21,7 @@ mod ubx;
 
 pub use course_config::CourseConfig;
 pub use described::HeadingSignal;
-pub(crate) use estimator::{BRIDGED, COARSE_BIAS, FINE_BIAS, gain_knowledge};
+pub(crate) use estimator::{BRIDGED, gain_knowledge};
 pub use estimator::{CourseCounters, CourseState, Estimator, Refusal};
 pub use gain::Gain;
 pub use gnss::{GnssLine, GnssProtocol, GnssSettings};

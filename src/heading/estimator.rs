@@ -9,14 +9,14 @@
 //! - the gain is learnt only where the vehicle turns both ways: in a steady circle a growing slip looks like a gain; and
 //!   only by courses on a straight, because during a turn a course that is smoothed, early or a trailer's is off as if by
 //!   a gain;
-//! - a course whose lag is known and at its bounds ([`LAGS`]) teaches only the heading;
+//! - a course whose lag is known and at its bounds ([`LAGS`]) teaches only heading and lag;
 //! - a course far from the expected heading is refused, and one at some distance has bounded influence. What else shows
 //!   false ones is in `failing`;
 //! - after a halt, and at low speed, a course may have jumped by half a turn, because the vehicle goes backwards.
 
 use super::course_config::CourseConfig;
 use super::failing::{Failing, Match, PATIENCE};
-use super::filter::{BIAS, Filter, GAIN, HEADING, LAG, Measured, wrap};
+use super::filter::{BIAS, COARSE_BIAS, FINE_BIAS, Filter, GAIN, HEADING, LAG, Measured, wrap};
 use super::gain::MAX_GAIN;
 use super::turns::{BLOCK, BLOCK_SECONDS, Turns};
 use super::{Gain, Heading};
@@ -48,16 +48,14 @@ const REMEMBERED: f32 = 12.0;
 const BOTH_WAYS: [f32; 2] = [1.0, 0.2];
 /// Turn during which a course that does not change has failed, rad.
 const STANDS: f32 = 0.05;
-/// Speed below which a course of unknown accuracy no longer teaches a known bias, nor the gain, m/s: reflections of 0.3 m/s last.
+/// Speed below which a course of unknown accuracy teaches neither a known bias nor the gain, m/s: there a reflection that
+/// moves the position by 0.3 m/s turns the course by several degrees, for many seconds.
 const SLOW: f32 = 4.0;
 /// Longest gap that is bridged by the mean of the rates around it, samples.
 pub(crate) const BRIDGED: u32 = RATE_HZ / 5;
 /// Fewest courses with which a vehicle starts in motion.
 const FEW: u32 = 5;
-/// Sigma of the bias with which a rate can be used, and with which it is as good as after a standstill, rad/s.
-pub(crate) const COARSE_BIAS: f32 = 2e-3;
-pub(crate) const FINE_BIAS: f32 = 5e-4;
-/// The same of the gain.
+/// Sigma of the gain from which it is coarse, and from which it is fine.
 const COARSE_GAIN: f32 = 0.003;
 const FINE_GAIN: f32 = 0.0015;
 
@@ -220,7 +218,7 @@ impl Estimator {
     /// Starts the heading again, because a turn may have been missed.
     pub(crate) fn restart(&mut self) {
         (self.turns, self.used, self.waiting, self.straight) = (Turns::EMPTY, None, None, 0);
-        self.failing.agree();
+        self.failing.forget_side();
     }
 
     /// Adds the turn of a sample; returns whether a block has ended.
@@ -313,7 +311,7 @@ impl Estimator {
         }
         measured.variance += innovation * (ratio / BOUNDED - 1.0).max(0.0);
         if paused > PATIENCE {
-            self.failing.agree();
+            self.failing.forget_side();
         }
         let side = off / sqrt((innovation - variance).max(0.0) + own);
         let side = side.clamp(-BOUNDED, BOUNDED);
@@ -336,9 +334,9 @@ impl Estimator {
         Ok(())
     }
 
-    /// Returns once that the bias has become coarse by courses that contradict it.
-    pub(crate) const fn has_doubted(&mut self) -> bool {
-        core::mem::replace(&mut self.failing.has_doubted, false)
+    /// Returns whether courses that contradict the bias have made it coarse since the last call.
+    pub(crate) const fn take_became_coarse(&mut self) -> bool {
+        core::mem::replace(&mut self.failing.became_coarse, false)
     }
 
     pub(crate) fn has_begun(&self) -> bool {

@@ -2,18 +2,17 @@
 //!
 //! Among houses, or where a receiver is deceived, courses are off for seconds or minutes, and some match by chance. So
 //!
-//! - those after a refused one teach only the heading: for a while before the bias is known ([`COST`]), then until all have
+//! - those after a refused one teach only heading and lag: for a while before the bias is known ([`COST`]), then until all have
 //!   matched for [`CALM`];
-//! - those that are off to one side on average ([`SIDE`]) teach only the heading, once others have confirmed the bias: one
+//! - those that are off to one side on average ([`SIDE`]) teach only heading and lag, once others have confirmed the bias: one
 //!   that drifts slowly never is far from the heading, which follows it. After [`SUSPENDED`] the gyro itself may have
 //!   changed, and the bias becomes coarse;
 //! - after [`PATIENCE`] without a match the heading starts again from the course; bias and gain are again those of the
 //!   newest course that matched well after [`CALM`], unless the vehicle has stood since. Where two such times show the
 //!   same drift, the bias becomes uncertain by it; where it was confirmed, only after [`MANY`] such times in a row;
-//! - courses that keep failing teach only the heading until they have matched for [`TRUST`].
+//! - courses that keep failing teach only heading and lag until they have matched for [`TRUST`].
 
-use super::estimator::COARSE_BIAS;
-use super::filter::{BIAS, Filter, GAIN, wrap};
+use super::filter::{BIAS, COARSE_BIAS, Filter, GAIN, wrap};
 use crate::sample::RATE_HZ;
 use core::ops::Range;
 
@@ -66,14 +65,15 @@ pub(super) struct Failing {
     trusted: u32,
     /// Samples with courses that matched since the newest one that was refused or off to one side.
     calm: u32,
-    /// Mean of the sides, which one was large last, and the samples for which it has been since the newest calm.
+    /// Mean of [`Match::side`], whether it was to the left when it was large last, and the samples for which it has been large
+    /// since the newest calm.
     side: f32,
     is_left: bool,
     suspended: u32,
-    /// The bias has become coarse, which the pipeline has not noted yet.
-    pub has_doubted: bool,
-    /// Courses have matched for most of [`TRUST`] with a known bias: for a while, those that drift away later are taken for
-    /// false.
+    /// The bias has become coarse, and the pipeline has not asked since.
+    pub became_coarse: bool,
+    /// Courses have matched for [`TRUST`] with a known bias. Courses that drift away later are taken for false until
+    /// [`SUSPENDED`].
     is_confirmed: bool,
     /// Samples with matching courses for which the learning of a bias that is not known yet is still suspended.
     owed: u32,
@@ -93,7 +93,7 @@ impl Failing {
         side: 0.0,
         is_left: false,
         suspended: 0,
-        has_doubted: false,
+        became_coarse: false,
         is_confirmed: false,
         owed: 0,
         before: [None; 2],
@@ -113,7 +113,7 @@ impl Failing {
             filter.restart::<BIAS>(bias, bias_variance);
             filter.restart::<GAIN>(gain, gain_variance);
         }
-        self.agree();
+        self.forget_side();
         let drift = self.start(tick, off);
         if let Some(drift) = drift.filter(|_| !self.is_confirmed || self.times >= MANY) {
             filter.put_variance::<BIAS>(filter.variance::<BIAS>() + drift * drift);
@@ -173,7 +173,7 @@ impl Failing {
         if self.suspended > SUSPENDED {
             filter.put_variance::<BIAS>(filter.variance::<BIAS>() + COARSE_BIAS * COARSE_BIAS);
             self.begin(filter);
-            (self.is_confirmed, self.has_doubted) = (false, true);
+            (self.is_confirmed, self.became_coarse) = (false, true);
         }
     }
 
@@ -186,7 +186,7 @@ impl Failing {
         }
     }
 
-    /// Notes bias and gain before the first course, or where all before it counts no more.
+    /// Notes bias and gain before the first course, or once what was kept before no longer holds.
     pub fn begin(&mut self, filter: &Filter) {
         self.before = [Some(learnt(filter)); 2];
     }
@@ -194,11 +194,11 @@ impl Failing {
     /// Drops bias and gain that are kept for a return, because the bias has been measured meanwhile.
     pub fn forget(&mut self) {
         self.before = [None; 2];
-        self.agree();
+        self.forget_side();
     }
 
     /// Forgets the side of the courses before, because the heading starts again or they are old.
-    pub fn agree(&mut self) {
+    pub fn forget_side(&mut self) {
         (self.side, self.suspended) = (0.0, 0);
     }
 

@@ -21,6 +21,9 @@ pub(crate) const GAIN: usize = 2;
 pub(crate) const HEADING: usize = 3;
 pub(crate) const LAG: usize = 4;
 const STATES: usize = 5;
+/// Sigma of the bias with which a rate can be used, and with which it is as good as after a standstill, rad/s.
+pub(crate) const COARSE_BIAS: f32 = 2e-3;
+pub(crate) const FINE_BIAS: f32 = 5e-4;
 
 type Vector = [f32; STATES];
 

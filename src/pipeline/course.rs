@@ -8,8 +8,8 @@ use super::level::Level;
 use super::{Pipeline, State};
 use crate::bias::ZeroRate;
 use crate::compensate::Remaining;
-use crate::heading::filter::{BIAS, Filter, GAIN};
-use crate::heading::{CourseCounters, CourseState, FINE_BIAS, Gain, Heading, Refusal, gain_knowledge};
+use crate::heading::filter::{BIAS, FINE_BIAS, Filter, GAIN};
+use crate::heading::{CourseCounters, CourseState, Gain, Heading, Refusal, gain_knowledge};
 use crate::health::slow::Knowledge;
 use crate::mounting::{Rotation, Vertical};
 use crate::sample::Frame;
@@ -118,7 +118,7 @@ impl Pipeline {
     /// standstill.
     pub(super) fn judge_start(&mut self) {
         if let Some(Initialised { zero_rate: Some(zero_rate), is_coarse, .. }) = &mut self.state.initialised {
-            let is_worse = self.state.course.has_doubted() || *is_coarse;
+            let is_worse = self.state.course.take_became_coarse() || *is_coarse;
             *is_coarse = is_worse && zero_rate.sigma() > FINE_BIAS;
         }
     }

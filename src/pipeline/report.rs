@@ -4,7 +4,7 @@ use super::{BoardState, Origin, Pipeline, Rates, Turning};
 use crate::bias::ZeroRate;
 use crate::compensate::Compensated;
 use crate::estimate::{VehicleSample, YawEstimate};
-use crate::heading::COARSE_BIAS;
+use crate::heading::filter::COARSE_BIAS;
 use crate::health::{Faults, Quality, Source, Status, judge};
 use crate::sample::{Frame, PERIOD_US, Validity, WheelSample};
 use crate::sqrt::sqrt;
