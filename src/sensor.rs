@@ -1,6 +1,6 @@
 //! Decoders of the bytes of a sensor into samples.
 //!
-//! The pipeline sees only the samples of a part: [`ImuSample`] or [`FogSample`](crate::sample::FogSample), in fixed
+//! The pipeline sees only the samples of a part: [`ImuSample`] or [`FogSample`], in fixed
 //! point, with the part's own time unwrapped. [`Source`] is the common interface of all parts, so that firmware can be
 //! generic over the part. The image selects one of its parts at the start, by configuration.
 //!
@@ -40,14 +40,16 @@ pub mod spi;
 mod stamps;
 pub mod xsens;
 
-use crate::sample::ImuSample;
+use crate::sample::{FogSample, ImuSample};
 use asm330lhh::Asm330lhh;
 use bmi088::Bmi088;
+use dsp1760::{Dsp1760, Dsp1760Error};
 use icm42688::Icm42688;
+use xsens::{Mti, XsensError};
 
 /// Delivers the samples of a part.
 pub trait Source {
-    /// The type of the part's samples: [`ImuSample`] or [`FogSample`](crate::sample::FogSample).
+    /// The type of the part's samples: [`ImuSample`] or [`FogSample`].
     type Sample;
     /// The error of a frame or a transfer.
     type Error: core::error::Error;
@@ -88,3 +90,34 @@ macro_rules! spi_sources {
 }
 
 spi_sources!(Asm330lhh, Bmi088, Icm42688);
+
+macro_rules! byte_sources {
+    ($($part:ident: $sample:ident, $error:ident;)*) => {$(
+        impl Source for $part {
+            type Sample = $sample;
+            type Error = $error;
+
+            #[inline]
+            fn next_sample(&mut self) -> Option<Result<$sample, $error>> {
+                // Only one byte in 36 or more ends a message, so most calls return early.
+                if self.framer.is_waiting() { None } else { self.next_message() }
+            }
+        }
+
+        impl ByteSource for $part {
+            #[inline]
+            fn receive(&mut self, byte: u8) {
+                self.framer.receive(byte);
+            }
+
+            fn bad_checksums(&self) -> u32 {
+                self.framer.bad_checksums()
+            }
+        }
+    )*};
+}
+
+byte_sources! {
+    Mti: ImuSample, XsensError;
+    Dsp1760: FogSample, Dsp1760Error;
+}

@@ -13,7 +13,6 @@ pub mod message;
 pub use framing::Kvh;
 
 use super::framer::Framer;
-use super::{ByteSource, Source};
 use crate::sample::{FogSample, StampClock};
 use crate::units::{Angle, CentiCelsius, Micros};
 use framing::is_self_test;
@@ -41,7 +40,7 @@ const MAX_INCREMENT: f32 = 490.0 * core::f32::consts::PI / 180.0 * 1e-6 * PERIOD
 /// The parser of a DSP-1760: converts bytes to increments with unwrapped time.
 #[derive(Debug, Clone, Default)]
 pub struct Dsp1760 {
-    framer: Framer<Kvh, MAX_MESSAGE>,
+    pub(super) framer: Framer<Kvh, MAX_MESSAGE>,
     last_sequence: Option<u8>,
     /// All messages, lost ones included, times the period, microseconds.
     time: u64,
@@ -60,8 +59,9 @@ impl Dsp1760 {
         self.framer.receive_some(bytes)
     }
 
+    /// Built-in-test messages are skipped.
     #[inline(never)]
-    fn next_message(&mut self) -> Option<Result<FogSample, Dsp1760Error>> {
+    pub(super) fn next_message(&mut self) -> Option<Result<FogSample, Dsp1760Error>> {
         loop {
             let frame = self.framer.next_frame()?;
             if is_self_test(frame) {
@@ -91,29 +91,6 @@ impl Dsp1760 {
         let increment = increments(&message.rotation, message.validity);
         let temperature = temperature.checked_mul(100).map(CentiCelsius);
         Ok(FogSample { time: Micros(time), span: PERIOD_US, lost, increment, temperature })
-    }
-}
-
-impl Source for Dsp1760 {
-    type Sample = FogSample;
-    type Error = Dsp1760Error;
-
-    /// Built-in-test messages are skipped.
-    #[inline]
-    fn next_sample(&mut self) -> Option<Result<FogSample, Dsp1760Error>> {
-        // Only one byte in 36 ends a message, so most calls return early.
-        if self.framer.is_waiting() { None } else { self.next_message() }
-    }
-}
-
-impl ByteSource for Dsp1760 {
-    #[inline]
-    fn receive(&mut self, byte: u8) {
-        self.framer.receive(byte);
-    }
-
-    fn bad_checksums(&self) -> u32 {
-        self.framer.bad_checksums()
     }
 }
 

@@ -9,7 +9,6 @@ mod mtdata2;
 pub use mtdata2::{MID_MT_DATA2, MtData2, XsensError};
 
 use super::framer::{Framer, Protocol};
-use super::{ByteSource, Source};
 use crate::sample::{ImuSample, NO_STAMP, StampClock, Validity};
 use crate::units::{AngularRate, CentiCelsius, Micros, SpecificForce};
 use mtdata2::id;
@@ -31,7 +30,7 @@ const STATUS_SELF_TEST: u32 = 1;
 
 /// The framing of Xbus messages.
 #[derive(Debug, Clone, Copy, Default)]
-struct Xbus;
+pub(super) struct Xbus;
 
 impl Protocol for Xbus {
     const HEADER: usize = 4;
@@ -63,7 +62,7 @@ impl Protocol for Xbus {
 /// The parser of an MTi: converts bytes to samples with unwrapped time.
 #[derive(Debug, Clone, Default)]
 pub struct Mti {
-    framer: Framer<Xbus, MAX_FRAME>,
+    pub(super) framer: Framer<Xbus, MAX_FRAME>,
     /// Unwraps SampleTimeFine, in 10 kHz ticks.
     stamps: StampClock,
 }
@@ -81,7 +80,7 @@ impl Mti {
     }
 
     #[inline(never)]
-    fn next_message(&mut self) -> Option<Result<ImuSample, XsensError>> {
+    pub(super) fn next_message(&mut self) -> Option<Result<ImuSample, XsensError>> {
         let message = match *self.framer.next_frame()? {
             [_, _, MID_MT_DATA2, len, ref data @ .., _] if len != EXTENDED_LENGTH => MtData2::parse(data),
             [_, _, mid, ..] => Err(XsensError::Foreign { mid }),
@@ -114,28 +113,6 @@ impl Mti {
             validity: Validity::reported(message.status.is_some_and(|status| status & STATUS_CLIPPED != 0)),
             time: message.sample_time_fine.map_or(NO_STAMP, |ticks| Micros(self.stamps.unwrap(ticks) * 100)),
         })
-    }
-}
-
-impl Source for Mti {
-    type Sample = ImuSample;
-    type Error = XsensError;
-
-    #[inline]
-    fn next_sample(&mut self) -> Option<Result<ImuSample, XsensError>> {
-        // Only one byte in 54 ends a message, so most calls return early.
-        if self.framer.is_waiting() { None } else { self.next_message() }
-    }
-}
-
-impl ByteSource for Mti {
-    #[inline]
-    fn receive(&mut self, byte: u8) {
-        self.framer.receive(byte);
-    }
-
-    fn bad_checksums(&self) -> u32 {
-        self.framer.bad_checksums()
     }
 }
 
