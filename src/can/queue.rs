@@ -54,12 +54,7 @@ impl<F, const N: usize> TransmitQueue<F, N> {
         }
     }
 
-    /// Removes the oldest frame, which a transport has accepted.
-    pub fn remove_front(&mut self) {
-        let _ = self.frames.pop_front();
-    }
-
-    /// Removes and returns the oldest frame, for a transport that always accepts it.
+    /// Removes and returns the oldest frame, which a transport accepts or has accepted.
     pub fn pop(&mut self) -> Option<F> {
         self.frames.pop_front()
     }

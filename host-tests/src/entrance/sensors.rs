@@ -4,7 +4,7 @@ use crate::gnss::{Pvt, sentence};
 use crate::wire::feed;
 use gyronet::heading::{GnssLine, GnssProtocol};
 use gyronet::sensor::asm330lhh::word::{Outputs, WORD, Word};
-use gyronet::sensor::bmi088::frame::{self, FORCE_FRAME, RATE_FRAME, STATE, State};
+use gyronet::sensor::bmi088::frame::{self, FORCE_FRAME, STATE, State};
 use gyronet::sensor::dsp1760::Dsp1760;
 use gyronet::sensor::dsp1760::message::CRC_32_MPEG_2;
 use gyronet::sensor::dsp1760::message::Message;
@@ -64,7 +64,7 @@ pub fn gnss(data: &[u8]) {
 
 /// Passes bytes as the state of the accelerometer, a frame of its FIFO and a frame of the gyro's: all readings are in range.
 pub fn bmi088(data: &[u8]) {
-    let (samples, _) = data.as_chunks::<{ STATE + FORCE_FRAME + RATE_FRAME }>();
+    let (samples, _) = data.as_chunks::<{ STATE + FORCE_FRAME + size_of::<[i16; 3]>() }>();
     for bytes in samples {
         let (state, rest) = bytes.split_first_chunk().expect("long enough");
         let (force, rest) = rest.split_first_chunk().expect("long enough");

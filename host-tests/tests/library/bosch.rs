@@ -66,9 +66,8 @@ fn a_sample_makes_three_messages() {
         messages.map(|m| i32::from(m.acceleration)),
         [acceleration(0.1), acceleration(0.2), acceleration(1.0)]
     );
-    let read = messages.map(|m| [m.rate_deg_per_sec(), m.acceleration_g()]);
-    for ([rate, force], due) in read.iter().zip([[10.0, 0.1], [-3.0, 0.2], [-2.0, 1.0]]) {
-        assert!((rate - due[0]).abs() < 0.005 && (force - due[1]).abs() < 0.000_13, "{rate} {force}");
+    for (rate, due) in messages.map(|m| m.rate_deg_per_sec()).into_iter().zip([10.0, -3.0, -2.0]) {
+        assert!((rate - due).abs() < 0.005, "{rate}");
     }
     assert!(messages.iter().all(|m| m.counter == 0xB), "one sample, one counter");
     assert_eq!(messages.map(|m| m.temperature), [75, 0, 0]);

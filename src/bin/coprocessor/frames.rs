@@ -154,7 +154,7 @@ impl Outgoing {
             if off || self.now.wrapping_sub(*made) > STALE_MS {
                 self.queue.drop_front();
             } else if can.transmit(frame, *made) {
-                self.queue.remove_front();
+                let _ = self.queue.pop();
             } else {
                 break;
             }

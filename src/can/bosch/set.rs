@@ -106,11 +106,6 @@ impl Message {
         f64::from(i32::from(self.rate) - ZERO) * 0.005
     }
 
-    /// Returns the acceleration in g (0.127465e-3 g a code).
-    pub fn acceleration_g(&self) -> f64 {
-        f64::from(i32::from(self.acceleration) - ZERO) * 0.000_127_465
-    }
-
     /// Returns the frame with a layout's identifier; `None` only if the driver's type cannot hold it.
     pub fn frame<F: Frame>(&self, layout: &Layout) -> Option<F> {
         F::new(layout.id, &self.emit())

@@ -114,7 +114,7 @@ impl<const N: usize> Port<N> {
             let room = self.line.first_chunk_mut();
             // All our frames fit SLCAN; any other is skipped.
             self.length = room.and_then(|room| encode(frame, time, room)).unwrap_or(0);
-            self.queue.remove_front();
+            let _ = self.queue.pop();
         }
         self.line.get(self.taken..self.length)
     }

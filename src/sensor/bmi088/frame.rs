@@ -14,7 +14,6 @@ use crate::sample::ImuSample;
 use crate::sensor::spi;
 use crate::units::{CentiCelsius, Micros};
 
-pub const RATE_FRAME: usize = 6;
 pub const FORCE_FRAME: usize = 7;
 pub const STATE: usize = 14;
 pub const TIME_MASK: u32 = 0xFF_FFFF;
