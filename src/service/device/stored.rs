@@ -169,23 +169,17 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             }
             let calibration = Calibration { unit };
             calibration.check().map_err(StoreError::from)?;
-            device.store_calibration(calibration)
+            device.store()?.set(&calibration)?;
+            device.calibration = calibration;
+            device.info.calibration = Origin::Stored;
+            Ok(())
         })
     }
 
     pub(super) fn store_learned(&mut self, learned: Learned) -> Result<(), Refusal> {
-        let store = self.store.as_mut().ok_or(StoreError::NoFlash)?;
-        store.set(&learned)?;
+        self.store()?.set(&learned)?;
         self.learned = learned;
         self.learner.is_changed = false;
-        Ok(())
-    }
-
-    pub(super) fn store_calibration(&mut self, calibration: Calibration) -> Result<(), Refusal> {
-        let store = self.store.as_mut().ok_or(StoreError::NoFlash)?;
-        store.set(&calibration)?;
-        self.calibration = calibration;
-        self.info.calibration = Origin::Stored;
         Ok(())
     }
 
