@@ -8,30 +8,8 @@ use gyronet::units::AngularRate;
 use serde::Serialize;
 use serde_json::Value;
 
-const NO_FOGNET: &str =
-    "retired, because FoGNet no longer runs on this board (`cargo paper tables` runs it on recordings)";
-const NO_LIMITS: &str =
-    "retired: a correction is limited to 6 deg/s in the mean of a window, 60 deg/s and 1 deg/s of revisions";
-const ONE_PROFILE: &str = "retired: the own messages have profile P01, whose bytes P11 sends too";
 /// Settings that have gone, with the reason or the successor. A name stands for those below it too.
-const RETIRED: [(&str, &str); 13] = [
-    ("fog_lane.fognet", NO_FOGNET),
-    ("fog_serial", NO_FOGNET),
-    ("fog_lane", "its name is fog_gyro now"),
-    (
-        "can.vdc2",
-        "retired, since VDC2 has no place for quality and expected error: use the board's own messages (can.yaw)",
-    ),
-    ("can.yaw.e2e.P02", ONE_PROFILE),
-    ("can.yaw.e2e.P05", ONE_PROFILE),
-    ("can.yaw.e2e.P11", ONE_PROFILE),
-    ("compensate.max_mean", NO_LIMITS),
-    ("compensate.max_single", NO_LIMITS),
-    ("compensate.max_revision", NO_LIMITS),
-    ("compensate.max_carry", NO_LIMITS),
-    ("slcan_inputs", "retired: wheels and courses come over CAN, without a vehicle from `cargo board`"),
-    ("compensate.mode", "its name is compensate.stride now"),
-];
+const RETIRED: &str = include_str!("retired.txt");
 /// Decimals, in rad/s, that distinguish any two codes.
 const RATE_DECIMALS: usize = 9;
 
@@ -51,10 +29,14 @@ pub fn to_value(configuration: &Configuration) -> Result<Value, SettingError> {
     Ok(value(configuration)?)
 }
 
+fn retired() -> impl Iterator<Item = (&'static str, &'static str)> {
+    RETIRED.lines().filter_map(|line| line.split_once(" | "))
+}
+
 /// Converts names and values to a configuration; ranges are not checked.
 pub fn from_value(value: Value) -> Result<Configuration, SettingError> {
     let path = |name: &str| format!("/{}", name.replace('.', "/"));
-    if let Some((name, instead)) = RETIRED.iter().find(|(name, _)| value.pointer(&path(name)).is_some()) {
+    if let Some((name, instead)) = retired().find(|(name, _)| value.pointer(&path(name)).is_some()) {
         return Err(SettingError::Retired(name, instead));
     }
     Ok(serde_json::from_value(value)?)
@@ -64,7 +46,7 @@ pub fn assign(configuration: &mut Value, setting: &str) -> Result<(), SettingErr
     let (name, text) = setting.split_once('=').ok_or_else(|| SettingError::NoAssignment(setting.into()))?;
     let is_below =
         |above: &str| name.strip_prefix(above).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'));
-    if let Some((name, instead)) = RETIRED.iter().find(|(retired, _)| is_below(retired)) {
+    if let Some((name, instead)) = retired().find(|(retired, _)| is_below(retired)) {
         return Err(SettingError::Retired(name, instead));
     }
     let place = name.split('.').try_fold(configuration, |value, key| match key.parse::<usize>() {
