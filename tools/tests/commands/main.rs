@@ -1,6 +1,5 @@
-//! The command `gyronet` as its user runs it, and the words that it prints for a board.
+//! The command `gyronet` as its user runs it.
 
-mod board_words;
 mod calibration;
 mod command_line;
 mod demo;
