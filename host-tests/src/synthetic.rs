@@ -11,6 +11,10 @@ pub fn rate(rad_per_sec: f64) -> AngularRate {
     AngularRate::from_rad_per_sec(rad_per_sec as f32).expect("a gyro's range")
 }
 
+pub fn deg_rate(deg_per_sec: f64) -> AngularRate {
+    rate(deg_per_sec.to_radians())
+}
+
 pub fn force(metre_per_sec2: f64) -> SpecificForce {
     SpecificForce::from_metre_per_sec2(metre_per_sec2 as f32).expect("an accelerometer's range")
 }

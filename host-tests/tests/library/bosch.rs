@@ -7,12 +7,9 @@ use gyronet::can::bosch::{
 };
 use gyronet::units::{AngularRate, CentiCelsius, SpecificForce};
 use gyronet_host_tests::noise::Noise;
+use gyronet_host_tests::synthetic::deg_rate;
 
 const STANDARD_GRAVITY: f32 = 9.806_65;
-
-fn rate(deg_per_sec: f64) -> AngularRate {
-    AngularRate::from_rad_per_sec(deg_per_sec.to_radians() as f32).expect("in range")
-}
 
 fn force(g: f32) -> SpecificForce {
     SpecificForce::from_metre_per_sec2(g * STANDARD_GRAVITY).expect("in range")
@@ -20,7 +17,7 @@ fn force(g: f32) -> SpecificForce {
 
 fn motion(yaw: f64, lateral: f32, counter: u8) -> Motion {
     Motion {
-        angular_rate: [AngularRate::ZERO, AngularRate::ZERO, rate(yaw)],
+        angular_rate: [AngularRate::ZERO, AngularRate::ZERO, deg_rate(yaw)],
         specific_force: [SpecificForce(0), force(lateral), force(1.0)],
         temperature: Some(CentiCelsius(2500)),
         rate_status: SignalStatus::OK,
@@ -52,7 +49,7 @@ fn frames_equal_published_vectors() {
 #[test]
 fn a_sample_makes_three_messages() {
     let motion = Motion {
-        angular_rate: [rate(3.0), rate(-2.0), rate(10.0)],
+        angular_rate: [3.0, -2.0, 10.0].map(deg_rate),
         specific_force: [force(0.2), force(0.1), force(1.0)],
         counter: 0x2B,
         ..motion(0.0, 0.0, 0)
@@ -115,7 +112,7 @@ fn integral_is_exact_on_all_three_axes() {
     let (mut received, mut turned) = ([0i64; 3], [0i64; 3]);
     for k in 0..120_000 {
         let any = |_| AngularRate(noise.int(-380_000_000, 380_000_000) as i32);
-        let rates = if k < 60_000 { [0, 1, 2].map(any) } else { [rate(0.001), rate(-0.001), rate(0.0007)] };
+        let rates = if k < 60_000 { [0, 1, 2].map(any) } else { [0.001, -0.001, 0.0007].map(deg_rate) };
         let messages = encoder.encode(&Motion { angular_rate: rates, ..motion(0.0, 0.0, 0) });
         // Yaw, roll against the right-hand rule, pitch.
         for (axis, (message, sign)) in [2, 0, 1].into_iter().zip(messages.iter().zip([1, -1, 1])) {

@@ -34,10 +34,7 @@ impl Gyro {
 
     fn sample(&mut self) -> FogSample {
         self.step += 1;
-        // The sum of twelve even numbers has a variance of one.
-        let normal: f64 =
-            (0..12).map(|_| self.noise.int(0, 1 << 40) as f64 / (1u64 << 40) as f64).sum::<f64>() - 6.0;
-        let turn = 0.01 * self.rate + 0.1 * f64::from(FogErrors::DSP1760.angle_walk) * normal;
+        let turn = 0.01 * self.rate + 0.1 * f64::from(FogErrors::DSP1760.angle_walk) * self.noise.normal();
         let increment = [None, None, Some(Angle((turn * f64::from(Angle::PER_RAD)).round() as i64))];
         let time = Micros(self.step * PERIOD_US);
         FogSample { time, span: PERIOD_US as u32, lost: 0, increment, temperature: None }

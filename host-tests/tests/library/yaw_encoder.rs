@@ -2,25 +2,18 @@
 
 use gyronet::can::e2e::{Checker, DataIdMode, P01, Profile, Verdict};
 use gyronet::can::yaw::{
-    AngleMessage, DetailMessage, Faults, LATENCY_UNKNOWN, Quality, RateMessage, SIGMA_UNKNOWN, Source,
-    YawError, encode_angle, encode_latency, encode_sigma,
+    AngleMessage, DetailMessage, Faults, LATENCY_UNKNOWN, RateMessage, SIGMA_UNKNOWN, YawError, encode_angle,
+    encode_latency, encode_sigma,
 };
 use gyronet::can::yaw_encoder::YawEncoder;
 use gyronet::estimate::YawEstimate;
 use gyronet::units::{AngularRate, Yaw};
+use gyronet_host_tests::synthetic::{deg_rate, estimate};
 
 const PERIOD_S: f64 = 0.01;
 
 fn p01() -> [Profile; 3] {
     [0x101, 0x102, 0x103].map(|data_id| Profile::P01(P01 { data_id, mode: DataIdMode::Both }))
-}
-
-fn rate(deg_per_sec: f64) -> AngularRate {
-    AngularRate::from_rad_per_sec(deg_per_sec.to_radians() as f32).expect("in range")
-}
-
-fn sample(rate: AngularRate, yaw: Yaw) -> YawEstimate {
-    YawEstimate { rate, yaw, source: Source::Model, quality: Quality::Good, ..YawEstimate::default() }
 }
 
 /// The sum of the decoded rates times the period, the accumulated yaw as sent and as it is, deg.
@@ -30,7 +23,7 @@ fn integrate(rates: impl Iterator<Item = AngularRate>, every: u8) -> (f64, f64, 
     let mut last = 0i32;
     for rate in rates {
         yaw.0 += i64::from(rate.0);
-        if let Some([rate, angle, _]) = feed.encode(&sample(rate, yaw)) {
+        if let Some([rate, angle, _]) = feed.encode(&estimate(rate, yaw)) {
             micro += i64::from(RateMessage::parse(&rate).expect("a rate message").rate);
             let code = AngleMessage::parse(&angle).expect("an angle message").yaw;
             // What a receiver does to get past the wrap.
@@ -60,7 +53,7 @@ fn a_period_of_several_samples_loses_nothing() {
 #[test]
 fn many_turns_wrap_as_an_angle_does() {
     // 100 turns left, then 200 right, at 90 deg/s.
-    let rates = (0..120_000).map(|k| rate(if k < 40_000 { 90.0 } else { -90.0 }));
+    let rates = (0..120_000).map(|k| deg_rate(if k < 40_000 { 90.0 } else { -90.0 }));
     let (sum, angle, yaw) = integrate(rates, 1);
     assert!((yaw + 36_000.0).abs() < 0.1, "{yaw}");
     assert!((angle - yaw).abs() < 1e-7, "{angle} {yaw}");
@@ -79,10 +72,10 @@ fn details_are_encoded_and_limited() {
     assert_eq!(RateMessage::parse(&[0; 7]), Err(YawError::Length(7)));
     let mut feed = YawEncoder::new(p01(), 1);
     let detailed = YawEstimate {
-        correction: rate(-0.022),
-        sigma: Some(rate(0.02)),
+        correction: deg_rate(-0.022),
+        sigma: Some(deg_rate(0.02)),
         latency_us: Some(71_234),
-        ..sample(rate(1.0), Yaw(0))
+        ..estimate(deg_rate(1.0), Yaw(0))
     };
     let [.., detail] = feed.encode(&detailed).expect("every sample");
     let detail = DetailMessage::parse(&detail).expect("a detail message");
@@ -104,7 +97,7 @@ fn messages_are_protected_and_belong_together() {
     let mut feed = YawEncoder::new(p01(), 1);
     let mut checkers = p01().map(|profile| Checker::new(profile, 1));
     for k in 0..300u16 {
-        let messages = feed.encode(&sample(rate(5.0), Yaw(0))).expect("every sample");
+        let messages = feed.encode(&estimate(deg_rate(5.0), Yaw(0))).expect("every sample");
         for (message, checker) in messages.iter().zip(&mut checkers) {
             let verdict = if k == 0 { Verdict::First } else { Verdict::Ok };
             assert_eq!(checker.check(message), Ok(verdict));
