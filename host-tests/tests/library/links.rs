@@ -1,8 +1,9 @@
 //! Every link inside the repository's pages leads to a file and, where it names one, to a heading; every test that a page
 //! names exists.
 
+use gyronet_host_tests::recordings::workspace;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 #[test]
 fn no_link_is_dead() {
@@ -26,7 +27,7 @@ fn no_link_is_dead() {
 /// Criterion: a page names a test as `binary::module::test` in backticks, and that module's file has such a function.
 #[test]
 fn tests_that_pages_name_exist() {
-    let root = root();
+    let root = workspace();
     let mut seen = 0;
     for path in pages() {
         let page = path.display();
@@ -50,13 +51,9 @@ fn tests_that_pages_name_exist() {
     assert!(seen > 5, "{seen} names found in all pages: are they read at all?");
 }
 
-fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
-}
-
 /// The repository's pages: every `.md` file, without what is built or downloaded.
 fn pages() -> Vec<PathBuf> {
-    let mut folders = vec![root()];
+    let mut folders = vec![workspace().to_owned()];
     let mut pages = Vec::new();
     while let Some(folder) = folders.pop() {
         for entry in fs::read_dir(folder).unwrap() {

@@ -5,26 +5,14 @@ use gyronet::can::DataFrame;
 use gyronet::can::slcan::{self, SlcanError};
 use gyronet_host_tests::wire::{data_frame, id11, id29};
 
-fn standard(id: u16, data: &[u8]) -> DataFrame {
-    data_frame(id11(id), data)
-}
-
-fn extended(id: u32, data: &[u8]) -> DataFrame {
-    data_frame(id29(id), data)
-}
-
-fn parse(line: &[u8]) -> Result<DataFrame, SlcanError> {
-    slcan::parse(line)
-}
-
 fn examples() -> [(DataFrame, &'static [u8]); 5] {
     let tx1 = [0xD0, 0x87, 0x00, 0x4B, 0x11, 0x83, 0x01, 0x00];
     [
-        (standard(0x174, &tx1), b"t1748D087004B11830100\r"),
-        (standard(0, &[]), b"t0000\r"),
-        (standard(0x7FF, &[0xA5]), b"t7FF1A5\r"),
-        (extended(0x18F0_0980, &[0x06, 0x83]), b"T18F0098020683\r"),
-        (extended(0x1FFF_FFFF, &[0xFF; 8]), b"T1FFFFFFF8FFFFFFFFFFFFFFFF\r"),
+        (data_frame(id11(0x174), &tx1), b"t1748D087004B11830100\r"),
+        (data_frame(id11(0), &[]), b"t0000\r"),
+        (data_frame(id11(0x7FF), &[0xA5]), b"t7FF1A5\r"),
+        (data_frame(id29(0x18F0_0980), &[0x06, 0x83]), b"T18F0098020683\r"),
+        (data_frame(id29(0x1FFF_FFFF), &[0xFF; 8]), b"T1FFFFFFF8FFFFFFFFFFFFFFFF\r"),
     ]
 }
 
@@ -32,9 +20,9 @@ fn examples() -> [(DataFrame, &'static [u8]); 5] {
 fn examples_are_read_and_written() {
     for (frame, line) in examples() {
         assert_eq!(slcan::emit(&frame).as_deref(), Some(line));
-        assert_eq!(parse(&line[..line.len() - 1]), Ok(frame));
+        assert_eq!(slcan::parse(&line[..line.len() - 1]), Ok(frame));
         assert_eq!(
-            parse(&line[..line.len() - 1].to_ascii_lowercase()).ok(),
+            slcan::parse(&line[..line.len() - 1].to_ascii_lowercase()).ok(),
             (line[0] == b't').then_some(frame)
         );
     }
@@ -53,7 +41,7 @@ fn bad_lines_are_refused() {
         (b"t8000", SlcanError::Identifier),
         (b"T200000000", SlcanError::Identifier),
     ] {
-        assert_eq!(parse(line), Err(error), "{:?}", line.escape_ascii().to_string());
+        assert_eq!(slcan::parse::<DataFrame>(line), Err(error), "{:?}", line.escape_ascii().to_string());
     }
 }
 
