@@ -55,7 +55,8 @@ fn run(configuration: &Configuration, calibration: &Calibration, learned: &Learn
     }
 }
 
-fn fitting(mut data: &[u8], is_full: bool) -> Vec<u8> {
+/// A sector of the records in these bytes, once or until it is full.
+pub fn fitting(mut data: &[u8], is_full: bool) -> Vec<u8> {
     let generation = 1_u32;
     let header = CRC.checksum(&(generation ^ u32::from_le_bytes(*b"GYR1")).to_le_bytes());
     let header = [generation.to_le_bytes(), header.to_le_bytes()].concat();

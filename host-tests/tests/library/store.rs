@@ -4,7 +4,6 @@ use embedded_storage::nor_flash::{NorFlash, NorFlashErrorKind};
 use gyronet::bias::ThermalBias;
 use gyronet::can::config::{ConfigError, YawSettings};
 use gyronet::can::wheel::{WheelConfigError, WheelSettings};
-use gyronet::model::blob::CRC;
 use gyronet::store::firmware;
 use gyronet::store::layout::{self, RECORD_SECTOR, SECTORS, SLOT_SIZE, sector_at};
 use gyronet::store::slots::{SlotError, file, select};
@@ -13,6 +12,7 @@ use gyronet::store::{
     StoreError,
 };
 use gyronet::units::{AngularRate, CentiCelsius, SpecificForce};
+use gyronet_host_tests::entrance::records;
 use gyronet_host_tests::flash::{F405, Flash, Region};
 use gyronet_host_tests::noise::{Noise, cases};
 use gyronet_host_tests::recordings::workspace;
@@ -127,13 +127,8 @@ fn another_layout_is_refused_by_its_number() {
 
 fn written(version: u8, content: &[u8]) -> Flash {
     let flash = Flash::default();
-    let mut record = vec![Configuration::KEY, version, content.len() as u8, 0];
-    record.extend(content);
-    record.resize(record.len().next_multiple_of(4), 0xFF);
-    record.extend(CRC.checksum(&record).to_le_bytes());
-    let header = CRC.checksum(&(1 ^ u32::from_le_bytes(*b"GYR1")).to_le_bytes());
-    let sector = [&1_u32.to_le_bytes()[..], &header.to_le_bytes(), &record].concat();
-    region(&flash).write(0, &sector).expect("it is blank");
+    let record = [&[Configuration::KEY, version, content.len() as u8], content].concat();
+    region(&flash).write(0, &records::fitting(&record, false)).expect("it is blank");
     flash
 }
 
