@@ -47,12 +47,6 @@ mod tests {
     }
 
     #[test]
-    fn everything_bundled_is_usable() {
-        assert_eq!(simulated_drive().unwrap().rows.len(), 9_000);
-        checkpoint().unwrap();
-    }
-
-    #[test]
     fn weights_are_what_quantize_makes() {
         let bytes = crate::network::quantize::quantize(&checkpoint().unwrap()).unwrap();
         assert!(bytes == gyronet::model::weights::GYRONET.0, "run: gyronet quantize");

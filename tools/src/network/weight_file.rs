@@ -47,26 +47,11 @@ mod tests {
     use super::*;
     use gyronet::model::weights::GYRONET;
 
-    fn refused(edit: impl Fn(&mut Vec<u8>)) -> String {
-        let mut bytes = GYRONET.0.to_vec();
-        edit(&mut bytes);
-        WeightFile::new("w.blob", &bytes).blob().unwrap_err().to_string()
-    }
-
     #[test]
     fn what_is_wrong_is_said_with_the_name() {
-        for (message, start) in [
-            (refused(|bytes| bytes[0] = b'X'), "w.blob: weight file: it begins with [58, 59"),
-            (refused(|bytes| bytes[4] = 9), "w.blob: weight file: format version 9"),
-            (refused(|bytes| bytes.truncate(70_001)), "w.blob: weight file: 70001 bytes"),
-            (refused(Vec::clear), "w.blob: weight file: "),
-            (refused(|bytes| bytes[90_000] ^= 1), "w.blob: weight file: checksum"),
-            (
-                WeightFile::read(Path::new("no/such.blob")).unwrap_err().to_string(),
-                "no/such.blob: No such file",
-            ),
-        ] {
-            assert!(message.starts_with(start), "{message}");
-        }
+        let cut = WeightFile::new("w.blob", &GYRONET.0[..70_001]).blob().unwrap_err().to_string();
+        assert!(cut.starts_with("w.blob: weight file: 70001 bytes"), "{cut}");
+        let none = WeightFile::read(Path::new("no/such.blob")).unwrap_err().to_string();
+        assert!(none.starts_with("no/such.blob: No such file"), "{none}");
     }
 }
