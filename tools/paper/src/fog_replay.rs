@@ -22,12 +22,9 @@ const STATIC_STEPS: usize = 300;
 pub struct FogReplay {
     /// Corrected turn of each step, rad.
     pub turns: Vec<f64>,
-    /// Steps with a correction.
-    pub corrected: u64,
     pub windows: u64,
     /// Estimates that were rejected as implausible.
     pub implausible: u64,
-    pub broken: u64,
 }
 
 pub fn run(sequence: &Sequence, network: &mut dyn MinuteNetwork) -> FogReplay {
@@ -44,9 +41,7 @@ pub fn run(sequence: &Sequence, network: &mut dyn MinuteNetwork) -> FogReplay {
         let output = corrector.correct(&frame, network);
         drive.turns.push(output.turn.rad());
         drive.windows += u64::from(output.is_window);
-        drive.corrected += u64::from(output.corrected);
         drive.implausible += u64::from(output.implausible);
-        drive.broken += u64::from(output.broken);
     }
     drive
 }
@@ -162,37 +157,4 @@ fn features(sequence: &Sequence) -> Vec<Option<Features>> {
 /// Returns the nearest code of an angle in rad; an f64 has more bits than the gyro.
 fn angle(rad: f64) -> Angle {
     Angle((rad * f64::from(Angle::PER_RAD)).round() as i64)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::simulate::{self, Spec};
-    use gyronet::model::fognet::FogEstimate;
-    use gyronet::model::seconds::SecondsWindow;
-
-    /// Estimates a constant bias and no other error.
-    struct Bias;
-
-    impl MinuteNetwork for Bias {
-        fn estimate(&mut self, window: &SecondsWindow<'_>) -> FogEstimate {
-            assert_eq!(window.iter().count(), 60);
-            FogEstimate { correction: angle(6e-4), linear: Angle::ZERO, gain: 0, clamped_inputs: 0 }
-        }
-    }
-
-    #[test]
-    fn a_constant_bias_comes_off_every_corrected_step() {
-        let folder = tempfile::tempdir().unwrap();
-        let spec = Spec { name: String::from("short"), seconds: 40, device: 1, run: 1 };
-        simulate::write(&spec, folder.path()).unwrap();
-        let sequence = Sequence::read(folder.path()).unwrap();
-        let fog = run(&sequence, &mut Bias);
-        assert_eq!((fog.windows, fog.broken), (39, 0));
-        let raw: f64 = sequence.steps.iter().map(|step| step.fog).sum();
-        // 1e-7 rad in each corrected step, whatever the gyro reads.
-        let taken = 1e-7 * fog.corrected as f64;
-        let off = raw - fog.turns.iter().sum::<f64>();
-        assert!((off - taken).abs() < 1e-9 && fog.corrected > 3_000, "{off} {taken}");
-    }
 }
