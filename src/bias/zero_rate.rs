@@ -442,6 +442,16 @@ impl ZeroRate {
         self.bound();
     }
 
+    /// Makes the filter's bias as uncertain as temperature makes it, once that is most of it; returns whether it has. By many
+    /// small changes it would become too certain, because they all have one sign.
+    pub(crate) fn takes_thermal(&mut self) -> bool {
+        let takes = self.thermal * self.thermal > self.filter.variance::<BIAS>();
+        if takes {
+            self.take_thermal();
+        }
+        takes
+    }
+
     fn take_thermal(&mut self) {
         self.filter.put_variance::<BIAS>(self.bias_variance());
         self.thermal = 0.0;

@@ -8,8 +8,8 @@
 //! - courses that follow each other within [`CORRELATION`] count as one;
 //! - the gain is learnt only where the vehicle turns both ways: in a steady circle a growing slip looks like a gain; and
 //!   only by courses on a straight, because during a turn a course that is smoothed, early or a trailer's is off as if by
-//!   a gain. Once the bias is settled ([`SETTLED`]), those between two straights hardly move the heading: they would hide
-//!   what the turn shows;
+//!   a gain. Once the bias is settled ([`SETTLED`]), those between two straights show the lag and hardly move the heading:
+//!   they would hide what the turn shows;
 //! - a course whose lag is known and at its bounds ([`LAGS`]) teaches only heading and lag;
 //! - a course far from the expected heading is refused, and one at some distance has bounded influence. What else shows
 //!   false ones is in `failing`;
@@ -36,8 +36,9 @@ const REFUSED: f32 = 4.0;
 /// Rate below which a vehicle goes straight, rad/s, and the blocks of it, 2 s, after which a course shows the gain.
 const STRAIGHT: f32 = 0.05;
 const STRAIGHT_BLOCKS: f32 = 20.0;
-/// Sigma of the bias with which the gain is learnt, rad/s; and the weight of a course that is not on a straight then.
-const SETTLED: f32 = 2e-4;
+/// Sigma of the bias, were the gain known, with which the gain is learnt, rad/s; and the weight of a course that is not on a
+/// straight then.
+const SETTLED: f32 = 2.8e-4;
 const BETWEEN: f32 = 1.0 / 16.0;
 /// Time without a course after which it may have turned by half a turn, samples.
 const HALT: u32 = 3 * RATE_HZ / 2;
@@ -145,6 +146,8 @@ pub struct Estimator {
     straight: u32,
     is_backwards: bool,
     failing: Failing,
+    /// A course has taught the bias, and the pipeline has not asked since.
+    has_taught: bool,
     refusal: Option<Refusal>,
     counters: CourseCounters,
 }
@@ -167,6 +170,7 @@ impl Estimator {
             straight: 0,
             is_backwards: false,
             failing: Failing::NONE,
+            has_taught: false,
             refusal: None,
             counters: CourseState::START.counters,
         }
@@ -329,17 +333,21 @@ impl Estimator {
         let new = Match { tick: arrived.tick, paused: paused.min(RATE_HZ), ratio, side, can_teach };
         let [teaches_bias, teaches_gain] = self.failing.matched(filter, &new, is_known);
         let teaches_bias = teaches_bias && is_in_time && (is_clear || !is_known);
-        let learns_gain = self.learns_gain && filter.variance::<BIAS>() <= SETTLED * SETTLED;
+        let learns_gain = self.learns_gain && filter.bias_beside_gain() <= SETTLED * SETTLED;
         let teaches_gain = teaches_gain && can_teach && learns_gain && is_straight;
-        if learns_gain && !is_straight {
-            measured.variance /= BETWEEN;
-        }
-        filter.course(&measured, [!teaches_bias, !teaches_gain]);
+        let weight = if learns_gain && !is_straight { BETWEEN } else { 1.0 };
+        self.has_taught |= teaches_bias;
+        filter.course(&measured, [!teaches_bias, !teaches_gain], weight);
         filter.put::<LAG>(filter.get::<LAG>().max(least).min(most));
         filter.put::<GAIN>(filter.get::<GAIN>().clamp(-MAX_GAIN, MAX_GAIN));
         self.used = Some(arrived.tick);
         self.failing.keep(filter, &new);
         Ok(())
+    }
+
+    /// Returns whether a course has taught the bias since the last call.
+    pub(crate) const fn take_has_taught(&mut self) -> bool {
+        core::mem::replace(&mut self.has_taught, false)
     }
 
     /// Returns whether courses that contradict the bias have made it coarse since the last call.

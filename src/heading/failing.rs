@@ -117,7 +117,7 @@ impl Failing {
         let drift = self.start(tick, off);
         if let Some(drift) = drift.filter(|_| !self.is_confirmed || self.times >= MANY) {
             filter.put_variance::<BIAS>(filter.variance::<BIAS>() + drift * drift);
-            (self.times, self.drift) = (0, None);
+            (self.times, self.drift, self.became_coarse) = (0, None, true);
         }
         true
     }

@@ -129,11 +129,19 @@ impl Filter {
         combined(&heading, -rate, &lag)
     }
 
-    /// Adds a course; a `held` bias or gain keeps value and variance, as a known source of error (Schmidt-Kalman).
-    pub fn course(&mut self, measured: &Measured, held: [bool; 2]) {
+    /// Returns the variance of the bias that would be left if the gain were known.
+    pub fn bias_beside_gain(&self) -> f32 {
+        let ([bias, _, both, ..], gain) = (self.covariance[BIAS], self.variance::<GAIN>());
+        if gain > 0.0 { bias - both * both / gain } else { bias }
+    }
+
+    /// Adds a course; a `held` bias or gain keeps value and variance, as a known source of error (Schmidt-Kalman). With a
+    /// `weight` below 1 the heading changes as by a course of so much less certainty.
+    pub fn course(&mut self, measured: &Measured, held: [bool; 2], weight: f32) {
         let with = self.with_course(measured.rate);
         let variance = with[HEADING] - measured.rate * with[LAG] + measured.variance;
         let mut gains = with.map(|with| with / variance);
+        gains[HEADING] *= variance / (variance + (1.0 / weight - 1.0) * measured.variance);
         let [is_bias_held, is_gain_held] = held;
         if is_bias_held {
             gains[BIAS] = 0.0;

@@ -30,6 +30,8 @@ const MOTORWAY_S: u32 = 2_040;
 const PROMISED: f64 = 0.3;
 /// Largest error of the last minute, after courses until then, over the same.
 const PROMISED_WITH_COURSES: f64 = 0.1;
+/// Largest error of the rate that is expected then, rad/s: courses show how warming has changed the bias.
+const EXPECTED: f64 = 6e-4;
 const MINUTE: usize = 60 * RATE_HZ as usize;
 /// A wheel stands once it has been slow for so many samples, as in the board's default settings.
 const STANDS: usize = 50;
@@ -69,22 +71,29 @@ fn at_the_end(drive: &Drive<'_>, board: Board<impl WindowNetwork>) -> f64 {
     off.sum::<f64>().to_degrees()
 }
 
-/// The heading error of the last minute of a drive, deg, by a board that has no courses in it.
-fn last_minute(drive: &Recording, mut board: Board<impl WindowNetwork>) -> f64 {
+/// The heading error of the last minute of a drive, deg, by a board that has no courses in it, and the error of the rate that
+/// it expects just before, rad/s.
+fn last_minute(drive: &Recording, mut board: Board<impl WindowNetwork>) -> [f64; 2] {
     let hidden = drive.rows.len() - MINUTE;
     let steps = drive.rows.iter().enumerate().filter_map(|(k, row)| {
         let heading = row.heading.filter(|_| k < hidden);
         board.row(&Row { heading, ..*row }).expect("it may move")
     });
-    let off = steps.filter(|step| step.row >= hidden).filter_map(|step| {
-        Some((step.delayed?.rate.rad_per_sec() - step.input.reference?) / f64::from(RATE_HZ))
-    });
-    off.sum::<f64>().to_degrees()
+    let (mut off, mut expected) = (0.0, f64::NAN);
+    for step in steps.filter(|step| step.row >= hidden) {
+        let Some((delayed, reference)) = step.delayed.zip(step.input.reference) else { continue };
+        off += (delayed.rate.rad_per_sec() - reference) / f64::from(RATE_HZ);
+        if step.row == hidden {
+            expected = delayed.sigma.expect("a sigma").rad_per_sec();
+        }
+    }
+    [off.to_degrees(), expected]
 }
 
 /// The heading errors of the motorway, deg, at its end and of its last minute: by zero-rate updates, and with what
-/// was learnt, in the last minute after courses until then.
-fn errors(device: u64) -> [[f64; 2]; 2] {
+/// was learnt, in the last minute after courses until then; and the error of the rate that a board that has learnt nothing
+/// expects there, rad/s.
+fn errors(device: u64) -> ([[f64; 2]; 2], f64) {
     let mut network = GyroNet::shipped().expect("the built-in weights");
     let mut learned = Learned::NOTHING;
     for day in 0..DAYS {
@@ -100,15 +109,20 @@ fn errors(device: u64) -> [[f64; 2]; 2] {
     };
     let uncorrected = |k| Board::new(config(k), drive.wheels(), Uncorrected);
     let learnt = at_the_end(&drive, Board::new(config(1), drive.wheels(), &mut network));
-    let last_minutes = [0, 1].map(|k| last_minute(&motorway, uncorrected(k).moving(k == 1)));
-    [[at_the_end(&drive, uncorrected(0)), learnt], last_minutes]
+    let last_minute = |k, takes_courses| last_minute(&motorway, uncorrected(k).moving(takes_courses));
+    let ([without, _], [with, _], [_, expected]) =
+        (last_minute(0, false), last_minute(1, true), last_minute(0, true));
+    ([[at_the_end(&drive, uncorrected(0)), learnt], [without, with]], expected)
 }
 
 #[test]
 fn what_was_learnt_and_courses_leave_the_promised_parts_of_the_drift() {
     let number = std::env::var("GYRONET_DEVICES").map_or(DEVICES, |text| text.parse().expect("a number"));
     let devices: Vec<u64> = (FIRST_DEVICE..FIRST_DEVICE + number).collect();
-    let errors = parallel::map(&devices, |device| errors(*device));
+    let (errors, expected): (Vec<_>, Vec<f64>) =
+        parallel::map(&devices, |device| errors(*device)).into_iter().unzip();
+    println!("expected: {expected:.5?} rad/s");
+    assert!(expected.iter().all(|sigma| *sigma < EXPECTED), "{expected:?}");
     let parts = [("half an hour", PROMISED), ("the last minute, after courses", PROMISED_WITH_COURSES)];
     for (k, (what, promised)) in parts.into_iter().enumerate() {
         let mut squares = [0.0; 2];
