@@ -421,7 +421,10 @@ impl Pipeline {
         let zero_rate = initialised.as_mut().and_then(|known| known.zero_rate.as_mut());
         let (Some(zero_rate), Some(complete)) = (zero_rate, complete) else { return };
         course.add(zero_rate.filter(), complete.tick, complete.valid_left(), standing.is_likely());
-        if course.take_has_taught() && zero_rate.takes_thermal() {
+        if course.take_has_taught()
+            && let Some(variance) = zero_rate.warmed(sensor_bias.change_sigma)
+        {
+            course.widen(variance);
             sensor_bias.refer();
         }
         match zero_rate.observe(complete.left(), standing, sensor_bias.change_sigma) {

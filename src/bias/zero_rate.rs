@@ -92,7 +92,7 @@ pub struct ZeroRate {
     /// The vehicle has stood without wheels, and not driven off since: it cannot turn.
     is_parked: bool,
     since_walk: u32,
-    /// Sigma of the change of the bias with temperature since the last update, rad/s.
+    /// Sigma of the change of the bias with temperature since the last update or [`Self::warmed`], rad/s.
     thermal: f32,
 }
 
@@ -146,7 +146,7 @@ impl ZeroRate {
 
     /// Adds the remaining rate of a complete sample (gyro less static bias less correction; `None` where it is not
     /// good). `thermal` is the sigma of the change of the bias with temperature since the last
-    /// [`ZeroRateOutcome::Used`], rad/s. Returns the outcome of a second at standstill with its last sample.
+    /// [`ZeroRateOutcome::Used`] or `warmed`, rad/s. Returns the outcome of a second at standstill with its last sample.
     pub fn observe(
         &mut self,
         left: Option<AngularRate>,
@@ -442,14 +442,15 @@ impl ZeroRate {
         self.bound();
     }
 
-    /// Makes the filter's bias as uncertain as temperature makes it, once that is most of it; returns whether it has. By many
-    /// small changes it would become too certain, because they all have one sign.
-    pub(crate) fn takes_thermal(&mut self) -> bool {
-        let takes = self.thermal * self.thermal > self.filter.variance::<BIAS>();
-        if takes {
+    /// Makes the bias that courses teach as uncertain as its change with temperature, of this sigma, makes it, once that is most
+    /// of it; returns the variance that this adds. By many small changes it would become too certain: they have one sign.
+    pub(crate) fn warmed(&mut self, thermal: f32) -> Option<f32> {
+        let variance = thermal * thermal;
+        (variance > self.filter.variance::<BIAS>()).then(|| {
+            self.thermal = thermal;
             self.take_thermal();
-        }
-        takes
+            variance
+        })
     }
 
     fn take_thermal(&mut self) {

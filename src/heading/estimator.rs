@@ -36,8 +36,8 @@ const REFUSED: f32 = 4.0;
 /// Rate below which a vehicle goes straight, rad/s, and the blocks of it, 2 s, after which a course shows the gain.
 const STRAIGHT: f32 = 0.05;
 const STRAIGHT_BLOCKS: f32 = 20.0;
-/// Sigma of the bias, were the gain known, with which the gain is learnt, rad/s; and the weight of a course that is not on a
-/// straight then.
+/// Sigma of the bias, less what the gain's own sigma adds to it, from which the gain is learnt, rad/s; and the share of its
+/// weight with which a course that is not on a straight then moves the heading.
 const SETTLED: f32 = 2.8e-4;
 const BETWEEN: f32 = 1.0 / 16.0;
 /// Time without a course after which it may have turned by half a turn, samples.
@@ -348,6 +348,11 @@ impl Estimator {
     /// Returns whether a course has taught the bias since the last call.
     pub(crate) const fn take_has_taught(&mut self) -> bool {
         core::mem::replace(&mut self.has_taught, false)
+    }
+
+    /// Takes the variance by which temperature has made the bias uncertain, (rad/s)^2.
+    pub(crate) fn widen(&mut self, variance: f32) {
+        self.failing.widen(variance);
     }
 
     /// Returns whether courses that contradict the bias have made it coarse since the last call.

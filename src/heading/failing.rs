@@ -191,6 +191,11 @@ impl Failing {
         self.before = [Some(learnt(filter)); 2];
     }
 
+    /// Makes the bias that is kept for a return as uncertain as the bias has become, which warming may have changed.
+    pub fn widen(&mut self, variance: f32) {
+        self.before.iter_mut().flatten().for_each(|[_, own, ..]| *own += variance);
+    }
+
     /// Drops bias and gain that are kept for a return, because the bias has been measured meanwhile.
     pub fn forget(&mut self) {
         self.before = [None; 2];

@@ -22,7 +22,7 @@ pub(super) struct SensorBias {
     newest: Option<([AngularRate; 3], f32)>,
     /// The bias of static initialisation, where the first temperature was reported after it.
     found: [AngularRate; 3],
-    /// Temperature at which zero-rate updates have found the rest, deg C, and the sigma of its change since, rad/s.
+    /// Temperature at which standstills or courses have shown the rest, deg C, and the sigma of its change since, rad/s.
     reference: Option<f32>,
     /// Sigma of the change of bias with temperature since the last [`SensorBias::refer`], rad/s; 0 without a temperature.
     pub(super) change_sigma: f32,

@@ -353,7 +353,10 @@ fn courses_that_show_turns_wrongly_leave_the_gain_within_two_sigma() {
             let (pipeline, ..) = drive_with(PipelineConfig::DEFAULT, part, 900, &drive);
             let (gain, sigma) = pipeline.gain();
             println!("{name}: gain {gain:+.5}, sigma {sigma:?}");
-            assert!(sigma.is_some_and(|sigma| gain.abs() < 2.0 * sigma), "{name}: {gain}, {sigma:?}");
+            // On streets it is learnt: 0.005 is its sigma before.
+            let most = if name.starts_with("streets") { 0.002 } else { 0.005 };
+            let is_right = |sigma| gain.abs() < 2.0 * sigma && sigma < most;
+            assert!(sigma.is_some_and(is_right), "{name}: {gain}, {sigma:?}");
         }
     }
 }

@@ -81,7 +81,7 @@ fn an_upload_that_is_refused_erases_nothing() {
     assert_eq!(flash.borrow().operations(), before);
 }
 
-/// At its old address it is refused under its own name; at GyroNet's by its topology, as another network's file is.
+/// At its old address it is refused under its own name.
 #[test]
 fn a_file_of_fognet_is_refused() {
     let (_, mut bench) = super::uds::bench();

@@ -30,7 +30,7 @@ pub fn to_value(configuration: &Configuration) -> Result<Value, SettingError> {
 }
 
 fn retired() -> impl Iterator<Item = (&'static str, &'static str)> {
-    RETIRED.lines().filter_map(|line| line.split_once(" | "))
+    RETIRED.lines().map(|line| line.split_once(" | ").expect("a name and its successor"))
 }
 
 /// Converts names and values to a configuration; ranges are not checked.

@@ -165,6 +165,13 @@ fn a_turning_wheel_is_named() {
 }
 
 #[test]
+fn an_unreadable_file_is_named() {
+    let error = Recording::read(Path::new("no/such/drive.csv")).unwrap_err();
+    assert!(error.to_string().starts_with("no/such/drive.csv: "), "{error}");
+    assert!(matches!(error.fault, DataFault::Io(_)));
+}
+
+#[test]
 fn bytes_that_are_no_text() {
     let mut bytes = unedited(400).into_bytes();
     let at = bytes.len() - 2;
