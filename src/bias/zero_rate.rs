@@ -442,8 +442,8 @@ impl ZeroRate {
         self.bound();
     }
 
-    /// Makes the bias that courses teach as uncertain as its change with temperature, of this sigma, makes it, once that is most
-    /// of it; returns the variance that this adds. By many small changes it would become too certain: they have one sign.
+    /// Adds the variance by which temperature has changed a bias that courses teach, from its sigma, once that is the larger
+    /// one; returns it. Added sample by sample it would be too little, because such changes have one sign.
     pub(crate) fn warmed(&mut self, thermal: f32) -> Option<f32> {
         let variance = thermal * thermal;
         (variance > self.filter.variance::<BIAS>()).then(|| {

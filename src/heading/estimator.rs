@@ -8,8 +8,8 @@
 //! - courses that follow each other within [`CORRELATION`] count as one;
 //! - the gain is learnt only where the vehicle turns both ways: in a steady circle a growing slip looks like a gain; and
 //!   only by courses on a straight, because during a turn a course that is smoothed, early or a trailer's is off as if by
-//!   a gain. Once the bias is settled ([`SETTLED`]), those between two straights show the lag and hardly move the heading:
-//!   they would hide what the turn shows;
+//!   a gain. Once the gain can be learnt ([`SETTLED`]), courses between two straights teach bias and lag, but hardly move
+//!   the heading, so that the next straight still shows by how much the gyro misread the turn;
 //! - a course whose lag is known and at its bounds ([`LAGS`]) teaches only heading and lag;
 //! - a course far from the expected heading is refused, and one at some distance has bounded influence. What else shows
 //!   false ones is in `failing`;
@@ -36,8 +36,8 @@ const REFUSED: f32 = 4.0;
 /// Rate below which a vehicle goes straight, rad/s, and the blocks of it, 2 s, after which a course shows the gain.
 const STRAIGHT: f32 = 0.05;
 const STRAIGHT_BLOCKS: f32 = 20.0;
-/// Sigma of the bias, less what the gain's own sigma adds to it, from which the gain is learnt, rad/s; and the share of its
-/// weight with which a course that is not on a straight then moves the heading.
+/// Sigma of the bias that would be left if the gain were known, up to which the gain is learnt, rad/s; and the weight with
+/// which a course between straights then moves the heading.
 const SETTLED: f32 = 2.8e-4;
 const BETWEEN: f32 = 1.0 / 16.0;
 /// Time without a course after which it may have turned by half a turn, samples.
@@ -146,7 +146,7 @@ pub struct Estimator {
     straight: u32,
     is_backwards: bool,
     failing: Failing,
-    /// A course has taught the bias, and the pipeline has not asked since.
+    /// True if a course has taught the bias since the last [`Self::take_has_taught`].
     has_taught: bool,
     refusal: Option<Refusal>,
     counters: CourseCounters,
@@ -350,7 +350,7 @@ impl Estimator {
         core::mem::replace(&mut self.has_taught, false)
     }
 
-    /// Takes the variance by which temperature has made the bias uncertain, (rad/s)^2.
+    /// Adds the variance of the bias's change with temperature to that of the bias kept for a return, (rad/s)^2.
     pub(crate) fn widen(&mut self, variance: f32) {
         self.failing.widen(variance);
     }

@@ -70,7 +70,7 @@ pub(super) struct Failing {
     side: f32,
     is_left: bool,
     suspended: u32,
-    /// The bias has become coarse, and the pipeline has not asked since.
+    /// True if the bias has become coarse since the estimator was last asked.
     pub became_coarse: bool,
     /// Courses have matched for [`TRUST`] with a known bias. Courses that drift away later are taken for false until
     /// [`SUSPENDED`].
@@ -191,7 +191,7 @@ impl Failing {
         self.before = [Some(learnt(filter)); 2];
     }
 
-    /// Makes the bias that is kept for a return as uncertain as the bias has become, which warming may have changed.
+    /// Adds a variance to that of the bias kept for a return, (rad/s)^2.
     pub fn widen(&mut self, variance: f32) {
         self.before.iter_mut().flatten().for_each(|[_, own, ..]| *own += variance);
     }

@@ -135,8 +135,8 @@ impl Filter {
         if gain > 0.0 { bias - both * both / gain } else { bias }
     }
 
-    /// Adds a course; a `held` bias or gain keeps value and variance, as a known source of error (Schmidt-Kalman). With a
-    /// `weight` below 1 the heading changes as by a course of so much less certainty.
+    /// Adds a course; a `held` bias or gain keeps value and variance, as a known source of error (Schmidt-Kalman). The
+    /// heading changes as if the course's variance were divided by `weight`, 0 to 1.
     pub fn course(&mut self, measured: &Measured, held: [bool; 2], weight: f32) {
         let with = self.with_course(measured.rate);
         let variance = with[HEADING] - measured.rate * with[LAG] + measured.variance;

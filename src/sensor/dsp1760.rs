@@ -53,7 +53,7 @@ impl Dsp1760 {
         Self { framer: Framer::new(), last_sequence: None, time: 0, stamps: StampClock::START }
     }
 
-    /// Takes bytes, at most to the end of a message, and returns how many; then call [`Dsp1760::next_sample`].
+    /// Takes bytes, at most to the end of a message, and returns how many; then call [`Source::next_sample`](super::Source::next_sample).
     #[inline]
     pub fn receive_some(&mut self, bytes: &[u8]) -> usize {
         self.framer.receive_some(bytes)

@@ -73,7 +73,7 @@ impl Mti {
         Self { framer: Framer::new(), stamps: StampClock::START }
     }
 
-    /// Takes bytes, at most to the end of a message, and returns how many; then call [`Mti::next_sample`].
+    /// Takes bytes, at most to the end of a message, and returns how many; then call [`Source::next_sample`](super::Source::next_sample).
     #[inline]
     pub fn receive_some(&mut self, bytes: &[u8]) -> usize {
         self.framer.receive_some(bytes)
@@ -89,7 +89,7 @@ impl Mti {
         Some(message.and_then(|message| self.sample(&message)))
     }
 
-    /// Returns the number of bytes that must arrive until [`Mti::next_sample`] can return something.
+    /// Returns the number of bytes that must arrive until [`Source::next_sample`](super::Source::next_sample) can return something.
     #[inline]
     pub fn missing(&self) -> usize {
         self.framer.missing()

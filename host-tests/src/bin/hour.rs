@@ -3,8 +3,8 @@
 //!
 //! The simulated receiver is lost in the last minute of every five, so the newest course is a minute old. Ideal filters, by
 //! standstills alone, stand beside: they know the simulation's noise and walk of the bias, and see each standstill from its first
-//! sample to its last. One expects that standing and driving differ as much as they do on recorded drives, as the board
-//! must; the other knows that on simulated ones they do not.
+//! sample to its last. One expects, as the board does, that the bias at rest differs from that in motion as much as on recorded
+//! drives; the other knows that on simulated ones it does not.
 
 use gyronet::bias::ZeroRateConfig;
 use gyronet::can;

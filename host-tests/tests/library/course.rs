@@ -402,6 +402,19 @@ fn a_confirmed_bias_is_held_for_two_minutes_against_courses_that_drift_away() {
     }
 }
 
+/// Nothing has confirmed the bias of the standstill when courses begin to drift away from it.
+#[test]
+fn courses_that_contradict_the_bias_of_one_rest_degrade_the_rate() {
+    let course =
+        |second: usize, headings: &[f64]| Some(ago(headings, 0.3)? + 0.02 * (second as f64 - 15.0).max(0.0));
+    let (pipeline, outputs, _) =
+        drive(60, &Drive { stands: 10, creeps: 0.0, turn: &|_| 0.0, course: &course });
+    let (status, live) = (pipeline.status(None), outputs.last().expect("outputs").vehicle.live);
+    let counters = pipeline.course_counters();
+    assert!(counters.restarts >= 2, "{counters:?}");
+    assert_eq!((status.bias, live.quality), (Knowledge::Coarse, Quality::Degraded));
+}
+
 /// Courses against zero-rate updates alone.
 #[test]
 fn courses_never_make_the_heading_worse_than_zero_rate_updates() {
